@@ -1,0 +1,50 @@
+//! A craft is a vehicle with its path, its virtual target and its path-following law: everything of one vehicle
+//! that does not concern the others.
+
+use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
+
+/// What a craft tells for the record; angles in radians, lengths in metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Observation {
+    /// Path parameter of the virtual target (pattern not removed).
+    pub xi: f64,
+    /// Its rate, as commanded for the coming period \[1/s\].
+    pub xi_rate: f64,
+    /// Reference rate v_r, or for crafts that take accelerations v_L \[1/s\].
+    pub v_ref: f64,
+    /// Position in the inertial frame \[m\].
+    pub position: [f64; 3],
+    /// Yaw, pitch and roll \[rad\] (Z-Y-X).
+    pub attitude: [f64; 3],
+    /// Forward speed \[m/s\].
+    pub speed: f64,
+    /// Path-following error along the path's tangent \[m\].
+    pub e_along: f64,
+    /// Path-following error across the path \[m\]: signed, positive to the left, for planar paths; the norm of the
+    /// part normal to the tangent for paths in space.
+    pub e_cross: f64,
+    /// Norm of the path-following error \[m\].
+    pub e_norm: f64,
+    /// Heading error \[rad\]: the heading (of the body's x-axis) relative to the path's tangent.
+    pub psi_e: f64,
+}
+
+/// A vehicle under its path-following law. The law is evaluated in [`command`](Craft::command) at each control
+/// period and its output held while [`advance`](Craft::advance) integrates the plant with RK4.
+pub trait Craft: Send {
+    /// The kind of demand it takes.
+    fn takes(&self) -> DemandKind;
+    /// What its coordination law may know of it; `xi` without the pattern removed.
+    fn own(&self, reference: SpeedReference) -> Own;
+    /// Evaluates the path-following law and holds its output. A demand of the wrong kind is a programming error
+    /// that the mission check excludes; it is ignored (the previous command is held).
+    fn command(&mut self, reference: SpeedReference, demand: Demand);
+    /// Integrates plant and virtual target over `dt` seconds in `substeps` RK4 steps.
+    fn advance(&mut self, dt: f64, substeps: usize);
+    /// What is recorded.
+    fn observe(&self) -> Observation;
+    /// Puts the virtual target at `xi` (rejoin after a restart).
+    fn place_target(&mut self, xi: f64);
+    /// True while every state is finite.
+    fn is_sound(&self) -> bool;
+}

@@ -1,0 +1,1 @@
+//! Path-following laws, one per file.

@@ -1,0 +1,1 @@
+//! Graphs, switching signals and what can be said of them.

@@ -1,0 +1,158 @@
+//! What is recorded: one struct per topic.
+//!
+//! Rows of [`Record`] are determined by the mission and its seed. What depends on the wall clock (achieved delays,
+//! missed deadlines) is in [`ClockRecord`], on topics of its own, so that equality of recordings means equality.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// State of one vehicle at one control instant. Angles in radians, lengths in metres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "the names are the documentation: they are the columns of vehicles.csv")]
+pub struct StateRow {
+    pub t_ns: i64,
+    pub vehicle: String,
+    pub xi: f64,
+    pub xi_rate: f64,
+    pub v_ref: f64,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub z_m: f64,
+    pub yaw_rad: f64,
+    pub pitch_rad: f64,
+    pub roll_rad: f64,
+    pub speed_mps: f64,
+    pub e_along_m: f64,
+    pub e_cross_m: f64,
+    pub e_norm_m: f64,
+    pub psi_e_rad: f64,
+    /// Number of neighbours in N_i at this instant.
+    pub neighbours: u16,
+}
+
+/// What became of a message on one directed link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// Handed to the receiver at `due_ns`.
+    Delivered,
+    /// Lost by the loss model.
+    Lost,
+    /// The link was down when it should have arrived.
+    LinkDown,
+    /// The queue of the link was full.
+    QueueFull,
+    /// Still under way when the mission ended.
+    InFlight,
+}
+
+/// One message on one directed link, written when its fate is known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "the names are the columns of links.csv")]
+pub struct MessageRow {
+    /// When the fate was decided.
+    pub t_ns: i64,
+    pub from: String,
+    pub to: String,
+    pub seq: u64,
+    /// When the emulator took it.
+    pub sent_ns: i64,
+    /// When it was to arrive.
+    pub due_ns: i64,
+    pub fate: Fate,
+}
+
+/// A directed link came up or went down.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "the names are the columns of topology.csv")]
+pub struct TopologyRow {
+    pub t_ns: i64,
+    pub from: String,
+    pub to: String,
+    pub up: bool,
+}
+
+/// The formation speed changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "plain")]
+pub struct SpeedRow {
+    pub t_ns: i64,
+    /// v_L \[units of ξ per s\].
+    pub speed: f64,
+}
+
+/// A row that the mission and its seed determine.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "one variant per row type")]
+pub enum Record {
+    State(StateRow),
+    Message(MessageRow),
+    Topology(TopologyRow),
+    Speed(SpeedRow),
+}
+
+impl Record {
+    /// When the row was written, in mission time \[ns\].
+    pub fn t_ns(&self) -> i64 {
+        match self {
+            Record::State(row) => row.t_ns,
+            Record::Message(row) => row.t_ns,
+            Record::Topology(row) => row.t_ns,
+            Record::Speed(row) => row.t_ns,
+        }
+    }
+}
+
+/// A delivery in real time: what was commanded and what was achieved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "plain")]
+pub struct AchievedRow {
+    pub t_ns: i64,
+    pub from: String,
+    pub to: String,
+    pub seq: u64,
+    /// Commanded delay \[ns of mission time\].
+    pub commanded_ns: i64,
+    /// Achieved minus commanded \[ns of wall clock\]; never negative.
+    pub late_ns: i64,
+}
+
+/// The control loop's deadlines since the last row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "plain")]
+pub struct TicksRow {
+    pub t_ns: i64,
+    pub vehicle: String,
+    pub met: u64,
+    pub missed: u64,
+    /// Largest lateness of a met deadline \[ns of wall clock\].
+    pub worst_late_ns: i64,
+}
+
+/// A line for people: a warning, a rejoin, a refused message, with how often it happened.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "plain")]
+pub struct NoteRow {
+    pub t_ns: i64,
+    pub source: String,
+    pub text: String,
+    pub count: u64,
+}
+
+/// A row that depends on the wall clock and the machine.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "one variant per row type")]
+pub enum ClockRecord {
+    Achieved(AchievedRow),
+    Ticks(TicksRow),
+    Note(NoteRow),
+}
+
+/// Any row.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Row {
+    /// Determined by the mission and its seed.
+    Exact(Record),
+    /// Depends on the wall clock.
+    Clock(ClockRecord),
+}

@@ -1,0 +1,1 @@
+//! The conditions and rates of the theorems as functions.

@@ -1,0 +1,1 @@
+//! Plants: equations of motion, one per file.
