@@ -15,3 +15,4 @@ pub mod record;
 pub mod theory;
 pub mod time;
 pub mod vehicle;
+pub mod wire;

@@ -21,6 +21,12 @@ impl Stream {
     pub fn unit(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
+    /// The `index`-th number of the stream, uniform on \[0, 1): a function of seed, name and index alone, whatever was
+    /// drawn before. Two numbers of one index are taken with `lane` 0 and 1.
+    pub fn unit_at(&mut self, index: u64, lane: u8) -> f64 {
+        self.0.set_word_pos(u128::from(index) * 16 + u128::from(lane) * 2);
+        self.unit()
+    }
     /// Uniform on \[low, high).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
@@ -45,6 +51,15 @@ mod tests {
         assert_eq!(draw(1, "a"), draw(1, "a"));
         assert_ne!(draw(1, "a"), draw(1, "b"));
         assert_ne!(draw(1, "a"), draw(2, "a"));
+    }
+
+    #[test]
+    fn a_number_by_index_does_not_depend_on_what_was_drawn_before() {
+        let mut stream = Stream::new(3, "link");
+        let (fifth, lane) = (stream.unit_at(5, 0), stream.unit_at(5, 1));
+        stream.unit_at(77, 0);
+        assert_eq!((stream.unit_at(5, 0), stream.unit_at(5, 1)), (fifth, lane));
+        assert_ne!(fifth, lane);
     }
 
     #[test]

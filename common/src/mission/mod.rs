@@ -1,0 +1,183 @@
+//! The mission: the file as written ([`file`]), and the checked form that the machines fly.
+
+mod check;
+mod fault;
+pub mod file;
+mod speed;
+
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+pub use check::schema;
+pub use fault::{Fault, Faults};
+pub use speed::SpeedProfile;
+
+use crate::coordination::CoordinationLaw;
+use crate::craft::Craft;
+use crate::graph::Graph;
+use crate::graph::switching::Switching;
+use crate::path::Path;
+use crate::time::{Span, Time};
+
+/// A mission that can be flown: every number is in its range and everything fits together.
+#[derive(Clone, Debug)]
+pub struct Mission {
+    /// The file as written: this is what is uploaded, digested and kept.
+    pub text: String,
+    /// First eight bytes of the SHA-256 of the text.
+    pub digest: u64,
+    /// Short name.
+    pub name: String,
+    /// One sentence for the report.
+    pub about: String,
+    /// Seed of every random stream.
+    pub seed: u64,
+    /// When it ends; a whole number of control periods.
+    pub end: Time,
+    /// The control laws run at this period.
+    pub control_period: Span,
+    /// Runge-Kutta steps per control period.
+    pub substeps: usize,
+    /// Control periods between recorded states.
+    pub record_ticks: i64,
+    /// Control periods between messages.
+    pub message_ticks: i64,
+    /// Formation speed over time.
+    pub speed: SpeedProfile,
+    /// The coordination law.
+    pub law: Arc<dyn CoordinationLaw>,
+    /// Which law, with its gains, as written.
+    pub law_choice: file::LawChoice,
+    /// A neighbour leaves N_i after this silence.
+    pub validity: Option<Span>,
+    /// What stands for a neighbour's state between its messages.
+    pub between: file::Between,
+    /// The vehicles, in the order of the file.
+    pub vehicles: Vec<VehiclePlan>,
+    /// The directed links, in the order of the file, both directions of a link side by side.
+    pub links: Vec<Link>,
+    /// Which links are up when.
+    pub switching: Switching,
+    /// Most messages under way on one directed link.
+    pub queue: usize,
+}
+
+/// One vehicle of a mission.
+#[derive(Clone, Debug)]
+pub struct VehiclePlan {
+    /// Its name.
+    pub id: String,
+    /// Its place in the pattern, h_i.
+    pub pattern: f64,
+    /// Its path.
+    pub path: Arc<dyn Path>,
+    /// Where it starts.
+    pub start: Start,
+    /// Its plant.
+    pub model: file::ModelChoice,
+    /// Its path-following law.
+    pub following: file::FollowingChoice,
+}
+
+/// Where a vehicle starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// Position \[m\].
+    pub position: [f64; 3],
+    /// Heading \[rad\].
+    pub yaw: f64,
+    /// Forward speed \[m/s\].
+    pub speed: f64,
+    /// Path parameter of the virtual target.
+    pub xi: f64,
+}
+
+/// One directed link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// Index of the sender.
+    pub from: usize,
+    /// Index of the receiver.
+    pub to: usize,
+    /// Its delay.
+    pub delay: Delay,
+    /// Probability that a message is lost.
+    pub loss: f64,
+}
+
+/// Delay of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Delay {
+    /// The same for every message.
+    Constant(Span),
+    /// Uniform between two bounds.
+    Uniform(Span, Span),
+}
+
+impl Delay {
+    /// The least it can be.
+    pub fn least(self) -> Span {
+        match self {
+            Delay::Constant(delay) | Delay::Uniform(delay, _) => delay,
+        }
+    }
+}
+
+/// First eight bytes of the SHA-256 of a mission file.
+pub fn digest(text: &str) -> u64 {
+    let hash = Sha256::digest(text.as_bytes());
+    u64::from_le_bytes(std::array::from_fn(|i| hash[i]))
+}
+
+impl Mission {
+    /// Reads and checks a mission file; `name` is what the faults call it.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn parse(name: &str, text: &str) -> Result<Mission, Faults> {
+        check::check(name, text)
+    }
+
+    /// Index of a vehicle by its id.
+    pub fn index_of(&self, id: &str) -> Option<usize> {
+        self.vehicles.iter().position(|vehicle| vehicle.id == id)
+    }
+
+    /// The graph of all links: who can ever hear whom.
+    pub fn graph(&self) -> Graph {
+        let arcs: Vec<(usize, usize)> = self.links.iter().map(|link| (link.to, link.from)).collect();
+        Graph::from_arcs(self.vehicles.len(), &arcs)
+    }
+
+    /// The least delay of any link: nothing said now is heard earlier.
+    pub fn least_delay(&self) -> Span {
+        self.links.iter().map(|link| link.delay.least()).min().unwrap_or(Span::ZERO)
+    }
+
+    /// The delay τ that the law was told, if it takes one \[s\].
+    pub fn law_delay(&self) -> Option<f64> {
+        match &self.law_choice {
+            file::LawChoice::Delayed(law) | file::LawChoice::DelayedWithLosses(law) => Some(law.delay_s),
+            _ => None,
+        }
+    }
+
+    /// v_L* / v_L = 1 / (1 + k τ), the speed at which delayed laws let the fleet travel (after Lemma 4.4); else 1.
+    pub fn nominal_factor(&self) -> f64 {
+        match &self.law_choice {
+            file::LawChoice::Delayed(law) | file::LawChoice::DelayedWithLosses(law) => {
+                1.0 / (1.0 + law.gain * law.delay_s)
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// The vehicle with its plant and its path-following law, where the mission starts it or at another place.
+    ///
+    /// # Errors
+    /// Why the vehicle cannot be built; the check has excluded it for the mission's own start.
+    pub fn craft(&self, vehicle: usize, start: Start) -> Result<Box<dyn Craft>, String> {
+        check::craft(&self.vehicles[vehicle], start, self.nominal_factor(), self.speed.fastest(), self.law.kind())
+    }
+}

@@ -1,0 +1,299 @@
+//! A flight as mission-control conducts it, as a pure machine: make contact, upload, wait until every vehicle is armed,
+//! start, watch, and collect the logs. `now` is the time since mission-control began.
+
+use std::collections::VecDeque;
+
+use common::machine::Machine;
+use common::time::{Span, Time};
+use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
+use common::wire::vehicle::{LogPiece, Phase};
+use network_emulator::hub::HUB;
+
+/// Between two questions after the fleet's status.
+const POLL: Span = Span::from_nanos(200_000_000);
+/// A piece of a log that has not come after this long is asked for again.
+const PIECE_PATIENCE: Span = Span::from_nanos(3_000_000_000);
+/// How often the same piece is asked for before the log is given up.
+const PIECE_TRIES: u32 = 5;
+/// How long a vehicle that is out of reach is waited for when the flight is over.
+const RETURN_PATIENCE: Span = Span::from_nanos(5_000_000_000);
+
+/// What can happen to a conducted flight, beside the passing of time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConductInput {
+    /// The line to the fleet is up.
+    Connected,
+    /// The line to the fleet is down.
+    Lost,
+    /// The fleet said something.
+    FromFleet(FromFleet),
+}
+
+/// What the conducted flight wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConductOutput {
+    /// Say this to the fleet.
+    Send(ToFleet),
+    /// How it goes.
+    Progress(Step, Option<FleetStatus>),
+    /// The flight is over, or was found to be; the logs are collected next.
+    Over(Phase),
+    /// A piece of a log.
+    Log {
+        /// Whose.
+        who: String,
+        /// The piece.
+        piece: LogPiece,
+    },
+    /// Everything that could be collected is here; what could not is named, with the reason.
+    Done {
+        /// How the flight ended.
+        phase: Phase,
+        /// Logs that are missing: whose, and why.
+        missing: Vec<(String, String)>,
+    },
+    /// It cannot be flown.
+    Failed(String),
+}
+
+/// Where a conducted flight is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "in order")]
+pub enum Step {
+    Contact,
+    Arming,
+    Starting,
+    Flying,
+    Collecting,
+    Ended,
+}
+
+/// A flight as mission-control conducts it.
+pub struct Conduct {
+    mission: String,
+    digest: u64,
+    pace: Pace,
+    /// How long to wait until every vehicle is armed.
+    patience: Option<Span>,
+    step: Step,
+    since: Time,
+    next_poll: Time,
+    ended: Phase,
+    /// Whose logs are still to be had, the present one first.
+    to_collect: VecDeque<Wanted>,
+    missing: Vec<(String, String)>,
+    outputs: VecDeque<ConductOutput>,
+}
+
+struct Wanted {
+    who: String,
+    file: u32,
+    offset: u64,
+    asked: Option<Time>,
+    tries: u32,
+}
+
+impl Conduct {
+    /// The flight of this mission file.
+    pub fn new(mission: &str, pace: Pace, patience: Option<Span>) -> Conduct {
+        Conduct {
+            digest: common::mission::digest(mission),
+            mission: mission.to_string(),
+            pace,
+            patience,
+            step: Step::Contact,
+            since: Time::ZERO,
+            next_poll: Time::ZERO,
+            ended: Phase::Idle,
+            to_collect: VecDeque::new(),
+            missing: Vec::new(),
+            outputs: VecDeque::new(),
+        }
+    }
+
+    fn send(&mut self, message: ToFleet) {
+        self.outputs.push_back(ConductOutput::Send(message));
+    }
+
+    fn enter(&mut self, step: Step, now: Time) {
+        self.step = step;
+        self.since = now;
+    }
+
+    fn fail(&mut self, reason: String) {
+        self.step = Step::Ended;
+        self.outputs.push_back(ConductOutput::Failed(reason));
+    }
+
+    fn poll(&mut self, now: Time) {
+        self.next_poll = now + POLL;
+        match self.step {
+            Step::Ended => {}
+            Step::Collecting => self.collect(now),
+            _ => self.send(ToFleet::Status),
+        }
+    }
+
+    fn status(&mut self, now: Time, status: FleetStatus) {
+        self.outputs.push_back(ConductOutput::Progress(self.step, Some(status.clone())));
+        let same = status.mission == self.mission;
+        match self.step {
+            Step::Contact if status.phase == Phase::Running && !same => {
+                let reason = "the fleet is flying another mission; stop it first (mission-control stop)";
+                self.fail(reason.to_string());
+            }
+            Step::Contact if status.phase == Phase::Running => self.enter(Step::Flying, now),
+            Step::Contact => {
+                let mission = self.mission.clone();
+                self.send(ToFleet::Upload { mission });
+                self.enter(Step::Arming, now);
+            }
+            Step::Arming if same => self.arming(now, &status),
+            Step::Starting if same && status.phase == Phase::Running => self.enter(Step::Flying, now),
+            Step::Starting if same && matches!(status.phase, Phase::Finished | Phase::Aborted) => {
+                self.over(now, &status);
+            }
+            Step::Flying => self.flying(now, &status, same),
+            _ => {}
+        }
+    }
+
+    fn arming(&mut self, now: Time, status: &FleetStatus) {
+        if let Some(refusal) = status.vehicles.iter().find(|v| v.phase == Phase::Idle && !v.reason.is_empty()) {
+            return self.fail(format!("{} refuses the mission: {}", refusal.id, refusal.reason));
+        }
+        let of_mission = || status.vehicles.iter().filter(|v| self.concerns(&v.id));
+        if of_mission().count() > 0 && of_mission().all(|v| v.connected && v.phase == Phase::Armed) {
+            let pace = self.pace;
+            self.send(ToFleet::Start { pace });
+            self.enter(Step::Starting, now);
+        } else if self.patience.is_some_and(|patience| now - self.since > patience) {
+            let waiting: Vec<String> = of_mission()
+                .filter(|v| !(v.connected && v.phase == Phase::Armed))
+                .map(|v| format!("{} ({})", v.id, if v.connected { v.phase.as_str() } else { "not connected" }))
+                .collect();
+            self.fail(format!("not every vehicle came to be armed; still waiting for {}", waiting.join(", ")));
+        }
+    }
+
+    /// Whether a vehicle belongs to this mission: its id is in the file.
+    fn concerns(&self, id: &str) -> bool {
+        self.mission.contains(&format!("\"{id}\""))
+    }
+
+    fn flying(&mut self, now: Time, status: &FleetStatus, same: bool) {
+        if !same {
+            // A hub that has just come back and knows nothing yet; a vehicle will tell it.
+            if status.phase != Phase::Idle {
+                self.fail("the fleet has gone on to another mission".to_string());
+            }
+            return;
+        }
+        if !matches!(status.phase, Phase::Finished | Phase::Aborted) {
+            return;
+        }
+        let still_flying = status.vehicles.iter().any(|v| v.connected && v.phase == Phase::Running);
+        let out_of_reach = status.vehicles.iter().any(|v| !v.connected);
+        if self.ended == Phase::Idle {
+            self.ended = status.phase;
+            self.since = now;
+        }
+        if !still_flying && (!out_of_reach || now - self.since > RETURN_PATIENCE) || now - self.since > RETURN_PATIENCE * 2 {
+            self.over(now, status);
+        }
+    }
+
+    fn over(&mut self, now: Time, status: &FleetStatus) {
+        self.ended = status.phase;
+        self.outputs.push_back(ConductOutput::Over(status.phase));
+        let wanted = |who: &str| Wanted { who: who.to_string(), file: 0, offset: 0, asked: None, tries: 0 };
+        self.to_collect.push_back(wanted(HUB));
+        for vehicle in &status.vehicles {
+            if vehicle.connected {
+                self.to_collect.push_back(wanted(&vehicle.id));
+            } else {
+                self.missing.push((vehicle.id.clone(), "not connected when the flight was over".to_string()));
+            }
+        }
+        self.enter(Step::Collecting, now);
+        self.collect(now);
+    }
+
+    /// Asks for the next piece, again if it has not come, or ends.
+    fn collect(&mut self, now: Time) {
+        while let Some(wanted) = self.to_collect.front_mut() {
+            if wanted.asked.is_some_and(|asked| now - asked < PIECE_PATIENCE) {
+                return;
+            }
+            wanted.tries += 1;
+            if wanted.tries <= PIECE_TRIES {
+                wanted.asked = Some(now);
+                let (who, file, offset) = (wanted.who.clone(), wanted.file, wanted.offset);
+                let digest = self.digest;
+                return self.send(ToFleet::SendLog { who, digest, file, offset });
+            }
+            let who = wanted.who.clone();
+            self.to_collect.pop_front();
+            self.missing.push((who, "it did not answer".to_string()));
+        }
+        self.step = Step::Ended;
+        let missing = std::mem::take(&mut self.missing);
+        self.outputs.push_back(ConductOutput::Done { phase: self.ended, missing });
+    }
+
+    fn log(&mut self, now: Time, who: &str, piece: LogPiece) {
+        let Some(wanted) = self.to_collect.front_mut() else { return };
+        let expected = wanted.who == who && wanted.file == piece.file && wanted.offset == piece.offset;
+        if !expected || self.step != Step::Collecting {
+            return;
+        }
+        wanted.offset += piece.bytes.len() as u64;
+        wanted.asked = None;
+        wanted.tries = 0;
+        let whole = wanted.offset >= piece.size || piece.bytes.is_empty();
+        let last = piece.file + 1 >= piece.files;
+        if whole {
+            wanted.file += 1;
+            wanted.offset = 0;
+        }
+        if piece.files == 0 {
+            self.missing.push((who.to_string(), "it has no log of this mission".to_string()));
+        } else {
+            self.outputs.push_back(ConductOutput::Log { who: who.to_string(), piece });
+        }
+        if whole && last {
+            self.to_collect.pop_front();
+        }
+        self.collect(now);
+    }
+}
+
+impl Machine for Conduct {
+    type Input = ConductInput;
+    type Output = ConductOutput;
+
+    fn handle(&mut self, now: Time, input: Option<ConductInput>) {
+        match input {
+            Some(ConductInput::Connected) => self.poll(now),
+            Some(ConductInput::Lost) => self.outputs.push_back(ConductOutput::Progress(self.step, None)),
+            Some(ConductInput::FromFleet(FromFleet::Status(status))) => self.status(now, status),
+            Some(ConductInput::FromFleet(FromFleet::Log { who, piece })) => self.log(now, &who, piece),
+            Some(ConductInput::FromFleet(FromFleet::Refused { reason })) => match self.step {
+                // A vehicle may have left between the status and the start.
+                Step::Starting => self.enter(Step::Arming, now),
+                Step::Arming => self.fail(reason),
+                _ => {}
+            },
+            Some(ConductInput::FromFleet(FromFleet::SpeedTaken { .. })) => {}
+            None => self.poll(now),
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<ConductOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        (self.step != Step::Ended).then_some(self.next_poll)
+    }
+}

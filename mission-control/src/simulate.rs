@@ -1,0 +1,167 @@
+//! The whole fleet in one thread: the same machines as the processes, connected by queues in place of Zenoh, with
+//! virtual time. What the processes record in a stepped run, this records bit for bit.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use common::machine::Machine;
+use common::mission::Mission;
+use common::record::Row;
+use common::time::Time;
+use common::wire::fleet::{Pace, ToFleet};
+use common::wire::vehicle::{ClockPlan, Phase};
+use network_emulator::hub::{Hub, HubInput, HubOutput};
+use vehicle_node::node::{NodeInput, NodeOutput, VehicleNode};
+
+use crate::conduct::{Conduct, ConductInput, ConductOutput};
+
+/// How a simulation ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Finished, or Aborted.
+    pub phase: Phase,
+    /// Mission time reached.
+    pub now: Time,
+    /// Sent, delivered, dropped and in flight, over all links.
+    pub messages: [u64; 4],
+}
+
+/// What happens next, and to whom.
+enum Event {
+    ToHub(HubInput),
+    ToNode(usize, NodeInput),
+    ToConduct(ConductInput),
+}
+
+struct Fleet<'m> {
+    mission: &'m Arc<Mission>,
+    hub: Hub,
+    nodes: Vec<VehicleNode>,
+    conduct: Conduct,
+    events: VecDeque<Event>,
+    now: Time,
+    outcome: Option<Result<Phase, String>>,
+}
+
+/// Flies a mission from its start to its end. Every row goes to `record` as it happens; `progress` is told the
+/// mission time from which on rows may still come and may end the simulation by returning false.
+///
+/// # Errors
+/// Why the fleet could not fly.
+pub fn simulate(
+    mission: &Arc<Mission>,
+    mut record: impl FnMut(Row),
+    mut progress: impl FnMut(Time) -> bool,
+) -> Result<Outcome, String> {
+    let mut fleet = Fleet {
+        mission,
+        hub: Hub::new(),
+        nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::new(&vehicle.id)).collect(),
+        conduct: Conduct::new(&mission.text, Pace::Stepped, None),
+        events: VecDeque::new(),
+        now: Time::ZERO,
+        outcome: None,
+    };
+    for (index, vehicle) in mission.vehicles.iter().enumerate() {
+        fleet.events.push_back(Event::ToHub(HubInput::Joined(vehicle.id.clone())));
+        fleet.events.push_back(Event::ToNode(index, NodeInput::Connected));
+    }
+    fleet.events.push_back(Event::ToConduct(ConductInput::Connected));
+    let mut told = Time::from_nanos(i64::MIN);
+    loop {
+        while let Some(event) = fleet.events.pop_front() {
+            fleet.step(event, &mut record);
+            if fleet.now > told {
+                told = fleet.now;
+                if !progress(told) {
+                    fleet.hub.handle(told, Some(HubInput::FromControl(ToFleet::Stop)));
+                    fleet.drain_hub(&mut record);
+                }
+            }
+            if let Some(outcome) = fleet.outcome.take() {
+                return Ok(Outcome { phase: outcome?, now: fleet.now, messages: fleet.hub.totals() });
+            }
+        }
+        // All is quiet: mission-control asks how it stands.
+        match fleet.conduct.poll_timeout() {
+            Some(at) => fleet.conduct.handle(at, None),
+            None => return Err("mission-control came to rest before the flight was over".to_string()),
+        }
+        fleet.drain_conduct();
+    }
+}
+
+impl Fleet<'_> {
+    fn step(&mut self, event: Event, record: &mut impl FnMut(Row)) {
+        match event {
+            Event::ToHub(input) => {
+                self.hub.handle(self.now, Some(input));
+                self.drain_hub(record);
+            }
+            Event::ToNode(index, input) => {
+                self.nodes[index].handle(self.now, Some(input));
+                self.drain_node(index, record);
+            }
+            Event::ToConduct(input) => {
+                self.conduct.handle(Time::ZERO, Some(input));
+                self.drain_conduct();
+            }
+        }
+    }
+
+    fn drain_hub(&mut self, record: &mut impl FnMut(Row)) {
+        while let Some(output) = self.hub.poll_output() {
+            match output {
+                HubOutput::ToVehicle(id, message) => {
+                    if let Some(index) = self.mission.index_of(&id) {
+                        self.events.push_back(Event::ToNode(index, NodeInput::Message(message)));
+                    }
+                }
+                HubOutput::ToControl(message) => {
+                    self.events.push_back(Event::ToConduct(ConductInput::FromFleet(message)));
+                }
+                HubOutput::Record(row) => record(row),
+                HubOutput::StartClock(_) => {
+                    self.events.push_back(Event::ToHub(HubInput::ClockStarted(ClockPlan::Stepped)));
+                }
+                // A stepped clock delivers with the grant; logs are not files here; the console is elsewhere.
+                HubOutput::Deliver(..)
+                | HubOutput::OpenLog(_)
+                | HubOutput::CloseLog
+                | HubOutput::FollowClock(_)
+                | HubOutput::ReadLog { .. }
+                | HubOutput::Say(_) => {}
+            }
+        }
+        self.now = self.now.max(self.hub.reached());
+    }
+
+    fn drain_node(&mut self, index: usize, record: &mut impl FnMut(Row)) {
+        while let Some(output) = self.nodes[index].poll_output() {
+            match output {
+                NodeOutput::Send(message) => {
+                    let id = self.mission.vehicles[index].id.clone();
+                    self.events.push_back(Event::ToHub(HubInput::FromVehicle(id, message)));
+                }
+                NodeOutput::Record(row) => record(row),
+                NodeOutput::Transmit(_)
+                | NodeOutput::OpenLog(_)
+                | NodeOutput::CloseLog
+                | NodeOutput::FollowClock(_)
+                | NodeOutput::ReadLog { .. }
+                | NodeOutput::Say(_) => {}
+            }
+        }
+    }
+
+    fn drain_conduct(&mut self) {
+        while let Some(output) = self.conduct.poll_output() {
+            match output {
+                ConductOutput::Send(message) => self.events.push_back(Event::ToHub(HubInput::FromControl(message))),
+                ConductOutput::Over(phase) => self.outcome = Some(Ok(phase)),
+                ConductOutput::Failed(reason) => self.outcome = Some(Err(reason)),
+                ConductOutput::Progress(..) | ConductOutput::Log { .. } | ConductOutput::Done { .. } => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! The channel: decides for every message and every directed link whether it arrives, and when. A pure machine.
+//!
+//! Decisions about a message are functions of (seed, link, sequence number) and of the planned switching signal, never
+//! of the order in which messages happen to come: two runs can be compared message by message.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+use std::sync::Arc;
+
+use common::graph::switching::Switching;
+use common::machine::Machine;
+use common::mission::{Delay, Mission};
+use common::random::Stream;
+use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, NoteRow, Record, Row, TopologyRow};
+use common::time::{Span, Time};
+use common::wire::state::CoordinationState;
+use common::wire::{Garbage, GarbageCount};
+
+use crate::ledger::Ledger;
+
+/// A vehicle put bytes on the air.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sent {
+    /// Index of the vehicle whose line they came from.
+    pub from: usize,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// What the channel wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Channel {
+    /// Hand these bytes to that vehicle.
+    Deliver {
+        /// Index of the receiver.
+        to: usize,
+        /// When they were due.
+        due: Time,
+        /// The bytes.
+        bytes: Arc<[u8]>,
+    },
+    /// Record this row.
+    Record(Row),
+}
+
+/// The emulated network of one mission.
+pub struct Emulator {
+    mission: Arc<Mission>,
+    links: Vec<Wire>,
+    /// Indices into `links`, by sender.
+    out: Vec<Vec<usize>>,
+    switching: Switching,
+    up: Vec<bool>,
+    next_change: Option<Time>,
+    under_way: BinaryHeap<Reverse<UnderWay>>,
+    /// Orders messages that are due at the same instant.
+    counter: u64,
+    garbage: Vec<GarbageCount>,
+    /// With a real clock the achieved delay is recorded beside the commanded one.
+    watch_delays: bool,
+    outputs: VecDeque<Channel>,
+}
+
+struct Wire {
+    from: usize,
+    to: usize,
+    delay: Delay,
+    loss: f64,
+    /// Two numbers per message: lane 0 decides the loss, lane 1 the delay.
+    stream: Stream,
+    ledger: Ledger,
+    /// Sequence number of the newest message taken, to tell a repetition.
+    newest: Option<u32>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct UnderWay {
+    due: Time,
+    order: u64,
+    link: usize,
+    seq: u32,
+    sent: Time,
+    bytes: Arc<[u8]>,
+}
+
+impl Ord for UnderWay {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.due, self.order).cmp(&(other.due, other.order))
+    }
+}
+
+impl PartialOrd for UnderWay {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Emulator {
+    /// The network of a mission at its start.
+    pub fn new(mission: Arc<Mission>, watch_delays: bool) -> Emulator {
+        let id = |i: usize| &mission.vehicles[i].id;
+        let mut out = vec![Vec::new(); mission.vehicles.len()];
+        let mut links = Vec::with_capacity(mission.links.len());
+        for (index, link) in mission.links.iter().enumerate() {
+            out[link.from].push(index);
+            links.push(Wire {
+                from: link.from,
+                to: link.to,
+                delay: link.delay,
+                loss: link.loss,
+                stream: Stream::new(mission.seed, &format!("link/{}->{}", id(link.from), id(link.to))),
+                ledger: Ledger::default(),
+                newest: None,
+            });
+        }
+        let switching = mission.switching.clone();
+        let mut emulator = Emulator {
+            up: vec![false; links.len()],
+            garbage: vec![GarbageCount::default(); mission.vehicles.len()],
+            links,
+            out,
+            switching,
+            next_change: Some(Time::ZERO),
+            under_way: BinaryHeap::new(),
+            counter: 0,
+            watch_delays,
+            outputs: VecDeque::new(),
+            mission,
+        };
+        emulator.change(Time::ZERO, true);
+        emulator
+    }
+
+    /// Brings a network that begins under way to the present without recording what it missed.
+    pub fn skip_to(&mut self, now: Time) {
+        while let Some(change) = self.next_change.filter(|change| *change <= now) {
+            self.change(change, false);
+        }
+    }
+
+    /// The ledger of each directed link, in the order of the mission's links.
+    pub fn ledgers(&self) -> impl Iterator<Item = &Ledger> {
+        self.links.iter().map(|link| &link.ledger)
+    }
+
+    /// Sent, delivered, dropped, in flight, over all links.
+    pub fn totals(&self) -> [u64; 4] {
+        self.ledgers().fold([0; 4], |[s, d, x, f], l| [s + l.sent, d + l.delivered, x + l.dropped(), f + l.in_flight])
+    }
+
+    /// Garbage counted per vehicle.
+    pub fn garbage(&self) -> &[GarbageCount] {
+        &self.garbage
+    }
+
+    /// Closes the books: what is under way is recorded as such.
+    pub fn finish(&mut self, now: Time) {
+        for Reverse(message) in std::mem::take(&mut self.under_way).into_sorted_vec().into_iter().rev() {
+            self.record_message(now, &message, Fate::InFlight);
+        }
+        for (vehicle, garbage) in self.garbage.iter().enumerate() {
+            if garbage.total() > 0 {
+                let text = format!("messages ignored that came from {}", self.mission.vehicles[vehicle].id);
+                let source = "network-emulator".to_string();
+                let row = NoteRow { t_ns: now.nanos(), source, text, count: garbage.total() };
+                self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Note(row))));
+            }
+        }
+    }
+
+    /// Takes a message from a vehicle: one decision per directed link.
+    fn take(&mut self, now: Time, sent: &Sent) -> Result<(), Garbage> {
+        let state = CoordinationState::decode(&sent.bytes)?;
+        if state.mission != self.mission.digest {
+            return Err(Garbage::WrongMission);
+        }
+        if state.sender as usize != sent.from {
+            return Err(Garbage::Forged);
+        }
+        let bytes: Arc<[u8]> = sent.bytes.as_slice().into();
+        for slot in 0..self.out[sent.from].len() {
+            let index = self.out[sent.from][slot];
+            let link = &mut self.links[index];
+            if link.newest.is_some_and(|newest| newest >= state.seq) {
+                return Err(Garbage::Stale);
+            }
+            link.newest = Some(state.seq);
+            link.ledger.take();
+            let due = now + Self::delay(link, state.seq);
+            let order = self.counter;
+            self.counter += 1;
+            let message = UnderWay { due, order, link: index, seq: state.seq, sent: now, bytes: bytes.clone() };
+            if link.stream.unit_at(u64::from(state.seq), 0) < link.loss {
+                self.settle(now, &message, Fate::Lost);
+            } else if link.ledger.in_flight > self.mission.queue as u64 {
+                self.settle(now, &message, Fate::QueueFull);
+            } else {
+                self.under_way.push(Reverse(message));
+            }
+        }
+        Ok(())
+    }
+
+    fn delay(link: &mut Wire, seq: u32) -> Span {
+        match link.delay {
+            Delay::Constant(delay) => delay,
+            Delay::Uniform(least, most) => {
+                let spread = (most.nanos() - least.nanos()) as f64;
+                Span::from_nanos(least.nanos() + (link.stream.unit_at(u64::from(seq), 1) * spread) as i64)
+            }
+        }
+    }
+
+    fn settle(&mut self, t: Time, message: &UnderWay, fate: Fate) {
+        self.links[message.link].ledger.settle(fate);
+        self.record_message(t, message, fate);
+    }
+
+    fn record_message(&mut self, t: Time, message: &UnderWay, fate: Fate) {
+        let link = &self.links[message.link];
+        let row = MessageRow {
+            t_ns: t.nanos(),
+            from: self.mission.vehicles[link.from].id.clone(),
+            to: self.mission.vehicles[link.to].id.clone(),
+            seq: u64::from(message.seq),
+            sent_ns: message.sent.nanos(),
+            due_ns: message.due.nanos(),
+            fate,
+        };
+        self.outputs.push_back(Channel::Record(Row::Exact(Record::Message(row))));
+    }
+
+    /// A message has come to the end of its delay: it is received if the link is up at that instant (p(t) gates
+    /// reception, erratum 4.22).
+    fn arrive(&mut self, now: Time, message: UnderWay) {
+        if !self.up[message.link] {
+            self.settle(message.due, &message, Fate::LinkDown);
+            return;
+        }
+        self.settle(message.due, &message, Fate::Delivered);
+        let link = &self.links[message.link];
+        if self.watch_delays {
+            let row = AchievedRow {
+                t_ns: message.due.nanos(),
+                from: self.mission.vehicles[link.from].id.clone(),
+                to: self.mission.vehicles[link.to].id.clone(),
+                seq: u64::from(message.seq),
+                commanded_ns: (message.due - message.sent).nanos(),
+                late_ns: (now - message.due).nanos(),
+            };
+            self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Achieved(row))));
+        }
+        self.outputs.push_back(Channel::Deliver { to: link.to, due: message.due, bytes: message.bytes });
+    }
+
+    /// The switching signal changes at `t`: record the links that come or go.
+    fn change(&mut self, t: Time, record: bool) {
+        for index in 0..self.links.len() {
+            let up = self.switching.is_up(index, t);
+            let first = t == Time::ZERO;
+            if record && (first || up != self.up[index]) {
+                let row = TopologyRow {
+                    t_ns: t.nanos(),
+                    from: self.mission.vehicles[self.links[index].from].id.clone(),
+                    to: self.mission.vehicles[self.links[index].to].id.clone(),
+                    up,
+                };
+                self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));
+            }
+            self.up[index] = up;
+        }
+        self.next_change = self.switching.next_change_after(t).filter(|change| *change <= self.mission.end);
+    }
+}
+
+impl Machine for Emulator {
+    type Input = Sent;
+    type Output = Channel;
+
+    fn handle(&mut self, now: Time, input: Option<Sent>) {
+        match input {
+            Some(sent) => {
+                if let Err(kind) = self.take(now, &sent)
+                    && self.garbage[sent.from].count(kind)
+                {
+                    let id = &self.mission.vehicles[sent.from].id;
+                    let text = format!("first message ignored from {id} that is {}", kind.as_str());
+                    let row = NoteRow { t_ns: now.nanos(), source: "network-emulator".into(), text, count: 1 };
+                    self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Note(row))));
+                }
+            }
+            None => {
+                // Changes and arrivals in the order of their instants; at the same instant the link changes first, so
+                // that an interval of up time contains its begin and not its end.
+                while let Some(next) = self.poll_timeout().filter(|next| *next <= now) {
+                    if self.next_change.is_some_and(|change| change <= next) {
+                        self.change(next, true);
+                    } else if let Some(Reverse(message)) = self.under_way.pop() {
+                        self.arrive(now, message);
+                    }
+                }
+            }
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<Channel> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        let arrival = self.under_way.peek().map(|Reverse(message)| message.due);
+        match (self.next_change, arrival) {
+            (Some(change), Some(arrival)) => Some(change.min(arrival)),
+            (change, arrival) => change.or(arrival),
+        }
+    }
+}

@@ -1,0 +1,619 @@
+//! The hub: the emulator program as a pure machine. Lets participants in, loads the mission, starts the clock, carries
+//! coordination states through the [`Emulator`], conducts the stepped clock, and relays the mission plane.
+//!
+//! The hub is the fleet's memory: a vehicle that comes back gets the mission and the clock from it, and so does a new
+//! mission-control. A hub that was killed gets both back from the first vehicle that finds it again.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use common::machine::Machine;
+use common::mission::{Mission, digest};
+use common::record::{ClockRecord, NoteRow, Record, Row, SpeedRow};
+use common::time::{Span, Time};
+use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
+use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
+
+use crate::emulator::{Channel, Emulator, Sent};
+use crate::lockstep::Lockstep;
+
+/// Name of the hub as a source of logs and notes.
+pub const HUB: &str = "network-emulator";
+
+/// A speed commanded now holds from this much later, so that every vehicle has it in time \[s of wall clock\].
+const SPEED_LEAD_S: f64 = 0.25;
+
+/// What can happen to the hub, beside the passing of time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HubInput {
+    /// A vehicle's line came up.
+    Joined(String),
+    /// A vehicle's line went down.
+    Left(String),
+    /// A vehicle said something on the mission plane.
+    FromVehicle(String, FromVehicle),
+    /// A vehicle put bytes on the air.
+    State(String, Vec<u8>),
+    /// Mission-control said something.
+    FromControl(ToFleet),
+    /// The driver has started the clock.
+    ClockStarted(ClockPlan),
+    /// A piece of the hub's own log, as asked for.
+    Log(LogPiece),
+}
+
+/// What the hub wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HubOutput {
+    /// Say this to a vehicle on the mission plane.
+    ToVehicle(String, ToVehicle),
+    /// Hand these bytes to a vehicle on the coordination plane.
+    Deliver(String, Arc<[u8]>),
+    /// Say this to mission-control.
+    ToControl(FromFleet),
+    /// Open a log for this mission.
+    OpenLog(Opened),
+    /// Record this row.
+    Record(Row),
+    /// The flight is over: close the log.
+    CloseLog,
+    /// Choose the clock's origin, start the clock, and answer with [`HubInput::ClockStarted`].
+    StartClock(Pace),
+    /// Follow this clock, which others started, and answer with [`HubInput::ClockStarted`].
+    FollowClock(ClockPlan),
+    /// Read a piece of the log and answer with [`HubInput::Log`].
+    ReadLog {
+        /// Which mission's.
+        digest: u64,
+        /// Which of its files.
+        file: u32,
+        /// From which byte.
+        offset: u64,
+    },
+    /// A line for people.
+    Say(String),
+}
+
+/// A mission whose log is to be opened.
+#[derive(Clone, Debug)]
+pub struct Opened(pub Arc<Mission>);
+
+impl PartialEq for Opened {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.digest == other.0.digest
+    }
+}
+
+/// The emulator program as a pure machine.
+pub struct Hub {
+    vehicles: BTreeMap<String, Known>,
+    load: Option<Load>,
+    outputs: VecDeque<HubOutput>,
+}
+
+#[derive(Clone, Debug)]
+struct Known {
+    connected: bool,
+    phase: Phase,
+    reason: String,
+}
+
+struct Load {
+    mission: Arc<Mission>,
+    phase: Phase,
+    clock: Option<ClockPlan>,
+    emulator: Emulator,
+    lockstep: Option<Lockstep>,
+    /// Speeds commanded under way.
+    speeds: Vec<SpeedCommand>,
+    /// Taken over from a vehicle after the hub lost its memory.
+    adopted: bool,
+    now: Time,
+}
+
+impl Default for Hub {
+    fn default() -> Self {
+        Hub::new()
+    }
+}
+
+impl Hub {
+    /// A hub that knows nothing yet.
+    pub fn new() -> Hub {
+        Hub { vehicles: BTreeMap::new(), load: None, outputs: VecDeque::new() }
+    }
+
+    /// Where the fleet is in its life.
+    pub fn phase(&self) -> Phase {
+        self.load.as_ref().map_or(Phase::Idle, |load| load.phase)
+    }
+
+    /// Mission time up to which a stepped run is complete.
+    pub fn reached(&self) -> Time {
+        self.load.as_ref().map_or(Time::ZERO, |load| load.now)
+    }
+
+    /// Sent, delivered, dropped and in flight over all links.
+    pub fn totals(&self) -> [u64; 4] {
+        self.load.as_ref().map_or([0; 4], |load| load.emulator.totals())
+    }
+
+    fn say(&mut self, text: String) {
+        self.outputs.push_back(HubOutput::Say(text));
+    }
+
+    fn to_vehicle(&mut self, id: &str, message: ToVehicle) {
+        self.outputs.push_back(HubOutput::ToVehicle(id.to_string(), message));
+    }
+
+    fn refuse(&mut self, reason: String) {
+        self.outputs.push_back(HubOutput::ToControl(FromFleet::Refused { reason }));
+    }
+
+    /// Ids of the mission's vehicles that are connected, in the mission's order.
+    fn connected(&self) -> Vec<String> {
+        let Some(load) = &self.load else { return Vec::new() };
+        let is_up = |id: &str| self.vehicles.get(id).is_some_and(|known| known.connected);
+        load.mission.vehicles.iter().map(|v| v.id.clone()).filter(|id| is_up(id)).collect()
+    }
+
+    fn to_fleet(&mut self, message: &ToVehicle) {
+        for id in self.connected() {
+            self.to_vehicle(&id, message.clone());
+        }
+    }
+
+    // --- mission-control -------------------------------------------------------------------------------------------
+
+    fn from_control(&mut self, now: Time, message: ToFleet) {
+        match message {
+            ToFleet::Status => self.status(now),
+            ToFleet::Upload { mission } => self.upload(now, &mission),
+            ToFleet::Start { pace } => self.start(pace),
+            ToFleet::Speed { speed } => self.speed(now, speed),
+            ToFleet::Stop => self.stop(now, "stopped by mission-control"),
+            ToFleet::SendLog { who, digest, file, offset } if who == HUB => {
+                self.outputs.push_back(HubOutput::ReadLog { digest, file, offset });
+            }
+            ToFleet::SendLog { who, digest, file, offset } => {
+                if self.vehicles.get(&who).is_some_and(|known| known.connected) {
+                    self.to_vehicle(&who, ToVehicle::SendLog { digest, file, offset });
+                } else {
+                    self.refuse(format!("{who} is not connected, so its log cannot be had now"));
+                }
+            }
+        }
+    }
+
+    fn status(&mut self, now: Time) {
+        let mut vehicles: Vec<VehicleStatus> = Vec::new();
+        let status = |id: &str, known: Option<&Known>| VehicleStatus {
+            id: id.to_string(),
+            connected: known.is_some_and(|k| k.connected),
+            phase: known.map_or(Phase::Idle, |k| k.phase),
+            reason: known.map_or(String::new(), |k| k.reason.clone()),
+        };
+        let mission = self.load.as_ref().map(|load| load.mission.clone());
+        if let Some(mission) = &mission {
+            vehicles.extend(mission.vehicles.iter().map(|v| status(&v.id, self.vehicles.get(&v.id))));
+        }
+        for (id, known) in &self.vehicles {
+            if known.connected && mission.as_ref().is_none_or(|m| m.index_of(id).is_none()) {
+                vehicles.push(status(id, Some(known)));
+            }
+        }
+        let load = self.load.as_ref();
+        let now = match load {
+            Some(load) if load.phase == Phase::Running && load.lockstep.is_none() => now.min(load.mission.end),
+            Some(load) => load.now,
+            None => Time::ZERO,
+        };
+        let speed = load.map_or(0.0, |load| {
+            let mut profile = load.mission.speed.clone();
+            load.speeds.iter().for_each(|command| profile.command(*command));
+            profile.at(now).v_l
+        });
+        let status = FleetStatus {
+            phase: self.phase(),
+            mission: load.map_or(String::new(), |load| load.mission.text.clone()),
+            now,
+            end: load.map_or(Time::ZERO, |load| load.mission.end),
+            speed,
+            vehicles,
+            messages: self.totals(),
+        };
+        self.outputs.push_back(HubOutput::ToControl(FromFleet::Status(status)));
+    }
+
+    fn upload(&mut self, now: Time, text: &str) {
+        if let Some(load) = self.load.as_ref().filter(|load| load.phase == Phase::Running) {
+            if load.mission.text != text {
+                let name = load.mission.name.clone();
+                self.refuse(format!("the fleet is flying {name}; stop it first (mission-control stop)"));
+            } else {
+                self.status(now);
+            }
+            return;
+        }
+        match Mission::parse("the uploaded mission", text) {
+            Err(faults) => self.refuse(faults.to_string()),
+            Ok(mission) => {
+                self.say(format!("mission {} loaded for {} vehicles", mission.name, mission.vehicles.len()));
+                self.load(Arc::new(mission), false);
+                for id in self.connected() {
+                    self.arm(&id);
+                }
+                self.status(now);
+            }
+        }
+    }
+
+    fn load(&mut self, mission: Arc<Mission>, adopted: bool) {
+        for vehicle in &mission.vehicles {
+            if let Some(known) = self.vehicles.get_mut(&vehicle.id) {
+                known.phase = Phase::Idle;
+                known.reason.clear();
+            }
+        }
+        self.load = Some(Load {
+            emulator: Emulator::new(mission.clone(), false),
+            mission,
+            phase: Phase::Armed,
+            clock: None,
+            lockstep: None,
+            speeds: Vec::new(),
+            adopted,
+            now: Time::ZERO,
+        });
+    }
+
+    fn arm(&mut self, id: &str) {
+        if let Some(load) = &self.load {
+            let mission = load.mission.text.clone();
+            self.to_vehicle(id, ToVehicle::Arm { mission });
+        }
+    }
+
+    fn start(&mut self, pace: Pace) {
+        let Some(load) = &self.load else { return self.refuse("no mission is loaded".into()) };
+        if load.phase == Phase::Running {
+            return self.refuse(format!("{} is already under way", load.mission.name));
+        }
+        let missing: Vec<&str> = load
+            .mission
+            .vehicles
+            .iter()
+            .map(|v| v.id.as_str())
+            .filter(|id| !self.vehicles.get(*id).is_some_and(|k| k.connected && k.phase == Phase::Armed))
+            .collect();
+        if !missing.is_empty() {
+            return self.refuse(format!("not every vehicle is armed: waiting for {}", missing.join(", ")));
+        }
+        self.outputs.push_back(HubOutput::StartClock(pace));
+    }
+
+    fn speed(&mut self, now: Time, speed: f64) {
+        if !speed.is_finite() {
+            return self.refuse(format!("found a formation speed of {speed}; allowed: a finite number"));
+        }
+        let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else {
+            return self.refuse("no flight is under way, so there is no speed to change".into());
+        };
+        let at = match (&load.lockstep, load.clock) {
+            (Some(lockstep), _) => lockstep.next_free(),
+            (None, Some(ClockPlan::Real { speed_up, .. })) => now + Span::from_secs(SPEED_LEAD_S * speed_up),
+            _ => now,
+        };
+        let command = SpeedCommand { at, speed };
+        load.speeds.push(command);
+        let row = SpeedRow { t_ns: at.nanos(), speed };
+        self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
+        match &mut load.lockstep {
+            Some(lockstep) => lockstep.speeds.push(command),
+            None => self.to_fleet(&ToVehicle::Speed(command)),
+        }
+        self.outputs.push_back(HubOutput::ToControl(FromFleet::SpeedTaken { at, speed }));
+    }
+
+    fn stop(&mut self, now: Time, why: &str) {
+        let Some(load) = self.load.as_mut().filter(|load| matches!(load.phase, Phase::Running | Phase::Armed)) else {
+            return self.refuse("no flight is under way, so there is nothing to stop".into());
+        };
+        let now = if load.lockstep.is_some() { load.lockstep.as_ref().map_or(now, |l| l.done()) } else { now };
+        let was_running = load.phase == Phase::Running;
+        load.phase = Phase::Aborted;
+        load.now = now;
+        if was_running {
+            load.emulator.finish(now);
+            self.drain_emulator();
+            self.note(now, why);
+            self.outputs.push_back(HubOutput::CloseLog);
+        }
+        self.to_fleet(&ToVehicle::Stop);
+        self.say(format!("flight ended: {why}"));
+        self.status(now);
+    }
+
+    fn note(&mut self, now: Time, text: &str) {
+        let row = NoteRow { t_ns: now.nanos().max(0), source: HUB.into(), text: text.into(), count: 1 };
+        self.outputs.push_back(HubOutput::Record(Row::Clock(ClockRecord::Note(row))));
+    }
+
+    // --- vehicles --------------------------------------------------------------------------------------------------
+
+    fn joined(&mut self, id: String) {
+        self.vehicles.entry(id).and_modify(|known| known.connected = true).or_insert(Known {
+            connected: true,
+            phase: Phase::Idle,
+            reason: String::new(),
+        });
+    }
+
+    fn left(&mut self, now: Time, id: &str) {
+        if let Some(known) = self.vehicles.get_mut(id) {
+            known.connected = false;
+        }
+        let Some(load) = &self.load else { return };
+        if load.mission.index_of(id).is_none() || load.phase != Phase::Running {
+            return;
+        }
+        if load.lockstep.is_some() {
+            self.stop(now, &format!("{id} left a stepped run, which needs every vehicle"));
+        } else {
+            self.note(now, &format!("lost the line to {id}"));
+        }
+    }
+
+    fn from_vehicle(&mut self, now: Time, id: &str, message: FromVehicle) {
+        match message {
+            FromVehicle::Hello { phase, flight } => self.hello(id, phase, flight),
+            FromVehicle::Armed { digest } => {
+                if self.set_phase(id, digest, Phase::Armed, String::new()) {
+                    self.join_flight(now, id);
+                }
+            }
+            FromVehicle::Refused { digest, reason } => {
+                self.say(format!("{id} refuses the mission: {reason}"));
+                self.set_phase(id, digest, Phase::Idle, reason);
+            }
+            FromVehicle::Reached { until, sent } => self.reached(id, until, sent),
+            FromVehicle::Ended { phase, reason } => {
+                if let Some(known) = self.vehicles.get_mut(id) {
+                    known.phase = phase;
+                    known.reason = reason;
+                }
+                if phase == Phase::Aborted
+                    && self.load.as_ref().is_some_and(|l| l.phase == Phase::Running && l.lockstep.is_some())
+                {
+                    self.stop(now, &format!("{id} aborted a stepped run, which needs every vehicle"));
+                }
+            }
+            FromVehicle::Log(piece) => {
+                self.outputs.push_back(HubOutput::ToControl(FromFleet::Log { who: id.to_string(), piece }));
+            }
+        }
+    }
+
+    /// Takes a vehicle's word for its phase if it speaks of the loaded mission.
+    fn set_phase(&mut self, id: &str, digest: u64, phase: Phase, reason: String) -> bool {
+        if self.load.as_ref().is_none_or(|load| load.mission.digest != digest) {
+            return false;
+        }
+        let Some(known) = self.vehicles.get_mut(id) else { return false };
+        known.phase = phase;
+        known.reason = reason;
+        true
+    }
+
+    fn hello(&mut self, id: &str, phase: Phase, flight: Option<FlightPlan>) {
+        let same = |load: &Load, flight: &FlightPlan| load.mission.digest == digest(&flight.mission);
+        if let Some(known) = self.vehicles.get_mut(id) {
+            known.phase = phase;
+        }
+        match (&self.load, flight) {
+            (None, Some(flight)) => self.adopt(id, phase, flight),
+            (Some(load), Some(flight)) if same(load, &flight) && phase != Phase::Armed => {
+                // It has flown on alone; tell it what it missed.
+                for command in load.speeds.clone() {
+                    self.to_vehicle(id, ToVehicle::Speed(command));
+                }
+            }
+            (Some(load), _) if load.mission.index_of(id).is_some() => self.arm(id),
+            _ => {}
+        }
+    }
+
+    /// After a restart: the vehicles know what the hub has forgotten.
+    fn adopt(&mut self, id: &str, phase: Phase, flight: FlightPlan) {
+        let Ok(mission) = Mission::parse("a vehicle's mission", &flight.mission) else { return };
+        if mission.index_of(id).is_none() {
+            return;
+        }
+        self.load(Arc::new(mission), true);
+        if let Some(known) = self.vehicles.get_mut(id) {
+            known.phase = phase;
+        }
+        let Some(load) = &mut self.load else { return };
+        load.speeds = flight.speeds;
+        match (phase, flight.clock) {
+            (Phase::Running, ClockPlan::Real { .. }) => {
+                let name = load.mission.name.clone();
+                self.outputs.push_back(HubOutput::FollowClock(flight.clock));
+                self.say(format!("{id} is flying {name}: carrying on"));
+            }
+            (phase, _) => {
+                load.phase = phase;
+                load.now = load.mission.end;
+            }
+        }
+        let others: Vec<String> = self.connected().into_iter().filter(|other| other != id).collect();
+        for other in others {
+            self.arm(&other);
+        }
+    }
+
+    /// A vehicle was armed: if the fleet is under way, it joins.
+    fn join_flight(&mut self, now: Time, id: &str) {
+        let Some(load) = self.load.as_ref().filter(|load| load.phase == Phase::Running) else { return };
+        if load.lockstep.is_some() {
+            return;
+        }
+        if let Some(clock) = load.clock {
+            let (digest, speeds) = (load.mission.digest, load.speeds.clone());
+            self.to_vehicle(id, ToVehicle::Start { digest, clock, speeds });
+            if let Some(known) = self.vehicles.get_mut(id) {
+                known.phase = Phase::Running;
+            }
+            self.note(now, &format!("{id} joins the flight under way"));
+        }
+    }
+
+    // --- the clock -------------------------------------------------------------------------------------------------
+
+    fn clock_started(&mut self, now: Time, clock: ClockPlan) {
+        let Some(load) = &mut self.load else { return };
+        let real = matches!(clock, ClockPlan::Real { .. });
+        load.phase = Phase::Running;
+        load.clock = Some(clock);
+        load.emulator = Emulator::new(load.mission.clone(), real);
+        load.lockstep = (!real).then(|| Lockstep::new(&load.mission));
+        self.outputs.push_back(HubOutput::OpenLog(Opened(load.mission.clone())));
+        if load.adopted {
+            load.emulator.skip_to(now);
+            while load.emulator.poll_output().is_some() {}
+            let text = format!("the emulator came back at {now}");
+            return self.note(now, &text);
+        }
+        load.speeds.clear();
+        let digest = load.mission.digest;
+        for step in load.mission.speed.steps() {
+            let row = SpeedRow { t_ns: step.at.nanos(), speed: step.speed };
+            self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
+        }
+        let name = load.mission.name.clone();
+        for known in self.vehicles.values_mut().filter(|known| known.phase == Phase::Armed) {
+            known.phase = Phase::Running;
+        }
+        self.to_fleet(&ToVehicle::Start { digest, clock, speeds: Vec::new() });
+        self.drain_emulator();
+        self.say(format!("{name} is under way"));
+        if !real {
+            self.grant();
+        }
+    }
+
+    /// Stepped clock: lets the fleet run as far as causality allows.
+    fn grant(&mut self) {
+        let Some(load) = &mut self.load else { return };
+        let Some(lockstep) = &mut load.lockstep else { return };
+        let until = lockstep.horizon();
+        // What arrives strictly before `until` is heard within the grant.
+        while let Some(at) = load.emulator.poll_timeout().filter(|at| *at < until) {
+            load.emulator.handle(at, None);
+        }
+        lockstep.grant(until);
+        self.drain_emulator();
+        let Some(load) = &mut self.load else { return };
+        let Some(lockstep) = &mut load.lockstep else { return };
+        let speeds = std::mem::take(&mut lockstep.speeds);
+        for (index, vehicle) in load.mission.vehicles.iter().enumerate() {
+            let heard = std::mem::take(&mut lockstep.heard[index]).0;
+            let message = ToVehicle::Grant { until, heard, speeds: speeds.clone() };
+            self.outputs.push_back(HubOutput::ToVehicle(vehicle.id.clone(), message));
+        }
+    }
+
+    fn reached(&mut self, id: &str, until: Time, sent: Vec<(Time, Vec<u8>)>) {
+        let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else { return };
+        let (Some(index), Some(lockstep)) = (load.mission.index_of(id), &mut load.lockstep) else { return };
+        if !lockstep.reached(index, until, sent) {
+            return;
+        }
+        load.now = until;
+        for (at, from, bytes) in lockstep.take_sent() {
+            load.emulator.handle(at, Some(Sent { from, bytes }));
+        }
+        if until < load.mission.end {
+            self.grant();
+        } else {
+            while let Some(at) = load.emulator.poll_timeout().filter(|at| *at <= until) {
+                load.emulator.handle(at, None);
+            }
+            self.finish(until);
+        }
+    }
+
+    fn finish(&mut self, now: Time) {
+        let Some(load) = &mut self.load else { return };
+        load.emulator.finish(now);
+        load.phase = Phase::Finished;
+        load.now = load.mission.end;
+        let name = load.mission.name.clone();
+        self.drain_emulator();
+        self.outputs.push_back(HubOutput::CloseLog);
+        self.say(format!("{name} is over"));
+    }
+
+    /// Carries out what the channel decided.
+    fn drain_emulator(&mut self) {
+        let Some(load) = &mut self.load else { return };
+        while let Some(output) = load.emulator.poll_output() {
+            match output {
+                Channel::Record(row) => self.outputs.push_back(HubOutput::Record(row)),
+                Channel::Deliver { to, due, bytes } => match &mut load.lockstep {
+                    Some(lockstep) => lockstep.heard[to].0.push((due, bytes.to_vec())),
+                    None => {
+                        let id = load.mission.vehicles[to].id.clone();
+                        self.outputs.push_back(HubOutput::Deliver(id, bytes));
+                    }
+                },
+            }
+        }
+    }
+}
+
+impl Machine for Hub {
+    type Input = HubInput;
+    type Output = HubOutput;
+
+    fn handle(&mut self, now: Time, input: Option<HubInput>) {
+        match input {
+            Some(HubInput::Joined(id)) => self.joined(id),
+            Some(HubInput::Left(id)) => self.left(now, &id),
+            Some(HubInput::FromVehicle(id, message)) => self.from_vehicle(now, &id, message),
+            Some(HubInput::FromControl(message)) => self.from_control(now, message),
+            Some(HubInput::ClockStarted(clock)) => self.clock_started(now, clock),
+            Some(HubInput::Log(piece)) => {
+                self.outputs.push_back(HubOutput::ToControl(FromFleet::Log { who: HUB.into(), piece }));
+            }
+            Some(HubInput::State(id, bytes)) => {
+                if let Some(load) = self.load.as_mut().filter(|l| l.phase == Phase::Running && l.lockstep.is_none())
+                    && let Some(from) = load.mission.index_of(&id)
+                {
+                    load.emulator.handle(now, Some(Sent { from, bytes }));
+                    self.drain_emulator();
+                }
+            }
+            None => {
+                if let Some(load) = self.load.as_mut().filter(|l| l.phase == Phase::Running && l.lockstep.is_none()) {
+                    load.now = now;
+                    load.emulator.handle(now.min(load.mission.end), None);
+                    let over = now >= load.mission.end;
+                    self.drain_emulator();
+                    if over {
+                        self.finish(now);
+                    }
+                }
+            }
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<HubOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        let load = self.load.as_ref().filter(|l| l.phase == Phase::Running && l.lockstep.is_none())?;
+        Some(load.emulator.poll_timeout().map_or(load.mission.end, |at| at.min(load.mission.end)))
+    }
+}

@@ -1,0 +1,320 @@
+//! One flight of one vehicle: the pure machine that runs its control loop.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use common::craft::Craft;
+use common::machine::Machine;
+use common::mission::{Mission, SpeedProfile, Start};
+use common::record::{ClockRecord, NoteRow, Record, Row, StateRow, TicksRow};
+use common::time::Time;
+use common::wire::Garbage;
+use common::wire::state::CoordinationState;
+use common::wire::vehicle::SpeedCommand;
+
+use crate::neighbours::Neighbours;
+
+/// What can happen to a flying vehicle, beside the passing of time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FlightInput {
+    /// Bytes came from the air.
+    Heard(Vec<u8>),
+    /// Another formation speed holds from an instant on.
+    Speed(SpeedCommand),
+}
+
+/// What a flying vehicle wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FlightOutput {
+    /// Put these bytes on the air.
+    Transmit(Vec<u8>),
+    /// Record this row.
+    Record(Row),
+    /// The mission's time is over.
+    Finished,
+    /// The vehicle cannot go on.
+    Failed(String),
+}
+
+/// Control periods between two rows about deadlines.
+const TICKS_PER_REPORT: u64 = 200;
+
+/// One flight of one vehicle.
+pub struct Flight {
+    mission: Arc<Mission>,
+    me: usize,
+    craft: Box<dyn Craft>,
+    neighbours: Neighbours,
+    speed: SpeedProfile,
+    /// The next control period to run, and the last one run.
+    next: i64,
+    last: Option<i64>,
+    over: bool,
+    /// Waits for the first neighbour to place its virtual target (a vehicle that comes back).
+    rejoining: bool,
+    /// Deadlines since the last report; only with a real clock.
+    deadlines: Option<Deadlines>,
+    outputs: VecDeque<FlightOutput>,
+}
+
+#[derive(Default)]
+struct Deadlines {
+    met: u64,
+    missed: u64,
+    worst_late_ns: i64,
+}
+
+impl Flight {
+    /// A flight from the mission's start.
+    ///
+    /// # Errors
+    /// Why the vehicle cannot be built.
+    pub fn new(mission: Arc<Mission>, me: usize, watch_deadlines: bool) -> Result<Flight, String> {
+        let start = mission.vehicles[me].start;
+        Flight::from(mission, me, start, Time::ZERO, watch_deadlines)
+    }
+
+    /// A flight that joins under way at `now`, at the place where the vehicle is.
+    ///
+    /// # Errors
+    /// Why the vehicle cannot be built.
+    pub fn rejoin(mission: Arc<Mission>, me: usize, start: Start, now: Time) -> Result<Flight, String> {
+        let mut flight = Flight::from(mission, me, start, now, true)?;
+        flight.rejoining = true;
+        Ok(flight)
+    }
+
+    fn from(mission: Arc<Mission>, me: usize, start: Start, now: Time, watch: bool) -> Result<Flight, String> {
+        let period = mission.control_period.nanos();
+        Ok(Flight {
+            craft: mission.craft(me, start)?,
+            neighbours: Neighbours::new(&mission, me),
+            speed: mission.speed.clone(),
+            next: (now.nanos() + period - 1).div_euclid(period).max(0),
+            last: None,
+            over: false,
+            rejoining: false,
+            deadlines: watch.then(Deadlines::default),
+            outputs: VecDeque::new(),
+            mission,
+            me,
+        })
+    }
+
+    /// The mission it flies.
+    pub fn mission(&self) -> &Arc<Mission> {
+        &self.mission
+    }
+
+    /// The instant of a control period.
+    fn instant(&self, tick: i64) -> Time {
+        Time::ZERO + self.mission.control_period * tick
+    }
+
+    /// Runs everything up to and including `until`, hearing each message at its instant: what the stepped clock does.
+    /// Effects go to `perform` with the instant at which they happened.
+    pub fn run_until(
+        &mut self,
+        until: Time,
+        inputs: impl IntoIterator<Item = (Time, FlightInput)>,
+        mut perform: impl FnMut(Time, FlightOutput),
+    ) {
+        let mut inputs = inputs.into_iter().peekable();
+        while let Some(tick) = self.poll_timeout().filter(|tick| *tick <= until) {
+            // A message that arrives at the instant of a control period is heard by the next one.
+            while let Some((at, input)) = inputs.next_if(|(at, _)| *at < tick) {
+                self.handle(at, Some(input));
+            }
+            self.handle(tick, None);
+            while let Some(output) = self.poll_output() {
+                perform(tick, output);
+            }
+        }
+        for (at, input) in inputs {
+            self.handle(at, Some(input));
+        }
+        while let Some(output) = self.poll_output() {
+            perform(until, output);
+        }
+    }
+
+    /// Runs the control period that is due at `now`, skipping those that were missed.
+    fn tick(&mut self, now: Time) {
+        let end = self.mission.end.nanos() / self.mission.control_period.nanos();
+        let due = now.nanos().div_euclid(self.mission.control_period.nanos()).min(end);
+        if due < self.next {
+            return;
+        }
+        self.watch_deadline(now, due);
+        let tick = due;
+        if let Some(last) = self.last {
+            for _ in last..tick {
+                self.craft.advance(self.mission.control_period.secs(), self.mission.substeps);
+            }
+        }
+        if !self.craft.is_sound() {
+            self.fail(now, "the vehicle's state is no longer a number");
+            return;
+        }
+        let t = self.instant(tick);
+        self.control(t, tick);
+        self.last = Some(tick);
+        self.next = tick + 1;
+        if tick >= end {
+            self.finish(t);
+        }
+    }
+
+    /// One control period: neighbours, coordination, path following, message, record.
+    fn control(&mut self, t: Time, tick: i64) {
+        let reference = self.speed.at(t);
+        let plan = &self.mission.vehicles[self.me];
+        if self.rejoining
+            && let Some(xi) = self.neighbours.formation_xi(t, reference.v_l)
+        {
+            self.craft.place_target(xi + plan.pattern);
+            self.rejoining = false;
+        }
+        let mut own = self.craft.own(reference);
+        own.xi -= plan.pattern;
+        let present = self.neighbours.present(t, reference.v_l);
+        let demand = self.mission.law.demand(reference, &own, present);
+        let heard = present.len() as u16;
+        self.craft.command(reference, demand);
+
+        if tick % self.mission.message_ticks == 0 {
+            let state = CoordinationState {
+                mission: self.mission.digest,
+                sender: self.me as u16,
+                seq: tick as u32,
+                made: t,
+                xi: own.xi,
+                eta_over_r: self.mission.law.needs_speed_error().then_some(own.eta / own.r),
+            };
+            if state.xi.is_finite() && state.eta_over_r.is_none_or(f64::is_finite) {
+                self.outputs.push_back(FlightOutput::Transmit(state.encode()));
+            } else {
+                self.fail(t, "the coordination state is not a number");
+                return;
+            }
+        }
+        if tick % self.mission.record_ticks == 0 || t >= self.mission.end {
+            let row = self.state_row(t, heard);
+            self.outputs.push_back(FlightOutput::Record(Row::Exact(Record::State(row))));
+        }
+    }
+
+    fn state_row(&self, t: Time, neighbours: u16) -> StateRow {
+        let o = self.craft.observe();
+        StateRow {
+            t_ns: t.nanos(),
+            vehicle: self.mission.vehicles[self.me].id.clone(),
+            xi: o.xi,
+            xi_rate: o.xi_rate,
+            v_ref: o.v_ref,
+            x_m: o.position[0],
+            y_m: o.position[1],
+            z_m: o.position[2],
+            yaw_rad: o.attitude[0],
+            pitch_rad: o.attitude[1],
+            roll_rad: o.attitude[2],
+            speed_mps: o.speed,
+            e_along_m: o.e_along,
+            e_cross_m: o.e_cross,
+            e_norm_m: o.e_norm,
+            psi_e_rad: o.psi_e,
+            neighbours,
+        }
+    }
+
+    fn watch_deadline(&mut self, now: Time, due: i64) {
+        let instant = self.instant(due);
+        let next = self.next;
+        let Some(deadlines) = &mut self.deadlines else { return };
+        deadlines.met += 1;
+        deadlines.missed += (due - next).max(0) as u64;
+        deadlines.worst_late_ns = deadlines.worst_late_ns.max((now - instant).nanos());
+        if deadlines.met + deadlines.missed >= TICKS_PER_REPORT {
+            self.report_deadlines(now);
+        }
+    }
+
+    fn report_deadlines(&mut self, now: Time) {
+        if let Some(deadlines) = self.deadlines.replace(Deadlines::default()) {
+            let row = TicksRow {
+                t_ns: now.nanos(),
+                vehicle: self.mission.vehicles[self.me].id.clone(),
+                met: deadlines.met,
+                missed: deadlines.missed,
+                worst_late_ns: deadlines.worst_late_ns,
+            };
+            self.outputs.push_back(FlightOutput::Record(Row::Clock(ClockRecord::Ticks(row))));
+        }
+    }
+
+    fn note(&mut self, now: Time, text: String, count: u64) {
+        let source = self.mission.vehicles[self.me].id.clone();
+        let row = NoteRow { t_ns: now.nanos(), source, text, count };
+        self.outputs.push_back(FlightOutput::Record(Row::Clock(ClockRecord::Note(row))));
+    }
+
+    fn finish(&mut self, now: Time) {
+        self.over = true;
+        if self.deadlines.is_some() {
+            self.report_deadlines(now);
+            for kind in [
+                Garbage::Foreign,
+                Garbage::Oversized,
+                Garbage::Malformed,
+                Garbage::NotFinite,
+                Garbage::WrongMission,
+                Garbage::Forged,
+                Garbage::FromTheFuture,
+                Garbage::Stale,
+            ] {
+                let count = self.neighbours.garbage.of(kind);
+                if count > 0 {
+                    self.note(now, format!("ignored messages: {}", kind.as_str()), count);
+                }
+            }
+        }
+        self.outputs.push_back(FlightOutput::Finished);
+    }
+
+    fn fail(&mut self, now: Time, reason: &str) {
+        self.over = true;
+        let text = format!("{} at {now}: {reason}", self.mission.vehicles[self.me].id);
+        self.note(now, text.clone(), 1);
+        self.outputs.push_back(FlightOutput::Failed(text));
+    }
+}
+
+impl Machine for Flight {
+    type Input = FlightInput;
+    type Output = FlightOutput;
+
+    fn handle(&mut self, now: Time, input: Option<FlightInput>) {
+        match input {
+            _ if self.over => {}
+            None => self.tick(now),
+            Some(FlightInput::Heard(bytes)) => {
+                // Old news is normal (duplicates, overtaking); anything else deserves one line.
+                if let Err(kind) = self.neighbours.hear(now, &bytes)
+                    && kind != Garbage::Stale
+                    && self.neighbours.garbage.of(kind) == 1
+                {
+                    self.note(now, format!("first message ignored that is {}", kind.as_str()), 1);
+                }
+            }
+            Some(FlightInput::Speed(command)) => self.speed.command(command),
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<FlightOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        (!self.over).then(|| self.instant(self.next))
+    }
+}

@@ -1,0 +1,347 @@
+//! The life of a vehicle process as a pure machine: `Idle -> Armed -> Running -> Finished`, `Aborted` from anywhere.
+//!
+//! A node starts knowing only its own name. The mission reaches it through its line, with its digest; it refuses one
+//! that it cannot fly, with the reason. It goes on flying when it loses its line, and when it comes back it says what
+//! it is doing.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use common::machine::Machine;
+use common::mission::{Mission, Start};
+use common::record::{Row, StateRow};
+use common::time::Time;
+use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
+
+use crate::flight::{Flight, FlightInput, FlightOutput};
+
+/// What can happen to a vehicle process, beside the passing of time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NodeInput {
+    /// The line is up.
+    Connected,
+    /// The line is down.
+    Lost,
+    /// Something came on the mission plane.
+    Message(ToVehicle),
+    /// Bytes came from the air.
+    Heard(Vec<u8>),
+    /// The driver has started the clock; `last` is what an earlier process of this vehicle recorded of this mission.
+    ClockStarted {
+        /// Its last recorded state, if there is one.
+        last: Option<Box<StateRow>>,
+    },
+    /// A piece of the log, as asked for.
+    Log(LogPiece),
+}
+
+/// What a vehicle process wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NodeOutput {
+    /// Say this on the mission plane.
+    Send(FromVehicle),
+    /// Put these bytes on the air.
+    Transmit(Vec<u8>),
+    /// Open a log for the armed mission.
+    OpenLog(Opened),
+    /// Record this row.
+    Record(Row),
+    /// The flight is over: close the log.
+    CloseLog,
+    /// Follow this clock and answer with [`NodeInput::ClockStarted`].
+    FollowClock(ClockPlan),
+    /// Read a piece of the log and answer with [`NodeInput::Log`].
+    ReadLog {
+        /// Which mission's.
+        digest: u64,
+        /// Which of its files.
+        file: u32,
+        /// From which byte.
+        offset: u64,
+    },
+    /// A line for people.
+    Say(String),
+}
+
+/// A mission whose log is to be opened.
+#[derive(Clone, Debug)]
+pub struct Opened(pub Arc<Mission>);
+
+impl PartialEq for Opened {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.digest == other.0.digest
+    }
+}
+
+/// A vehicle process as a pure machine.
+pub struct VehicleNode {
+    id: String,
+    phase: Phase,
+    load: Option<Load>,
+    outputs: VecDeque<NodeOutput>,
+}
+
+struct Load {
+    mission: Arc<Mission>,
+    me: usize,
+    clock: Option<ClockPlan>,
+    speeds: Vec<SpeedCommand>,
+    flight: Option<Flight>,
+}
+
+impl VehicleNode {
+    /// A vehicle called `id` that knows nothing yet.
+    pub fn new(id: &str) -> VehicleNode {
+        VehicleNode { id: id.to_string(), phase: Phase::Idle, load: None, outputs: VecDeque::new() }
+    }
+
+    /// Where it is in its life.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    fn send(&mut self, message: FromVehicle) {
+        self.outputs.push_back(NodeOutput::Send(message));
+    }
+
+    fn say(&mut self, text: String) {
+        self.outputs.push_back(NodeOutput::Say(text));
+    }
+
+    fn message(&mut self, message: ToVehicle) {
+        match message {
+            ToVehicle::Arm { mission } => self.arm(&mission),
+            ToVehicle::Start { digest, clock, speeds } => self.start(digest, clock, speeds),
+            ToVehicle::Speed(command) => self.speed(command),
+            ToVehicle::Stop => self.stop(),
+            ToVehicle::Grant { until, heard, speeds } => self.grant(until, heard, speeds),
+            ToVehicle::SendLog { digest, file, offset } => {
+                self.outputs.push_back(NodeOutput::ReadLog { digest, file, offset });
+            }
+        }
+    }
+
+    fn arm(&mut self, text: &str) {
+        let digest = common::mission::digest(text);
+        if self.phase == Phase::Running {
+            let flying = self.load.as_ref().map_or("another mission", |load| load.mission.name.as_str());
+            let reason = format!("{} is flying {flying}", self.id);
+            return self.send(FromVehicle::Refused { digest, reason });
+        }
+        match self.accept(text) {
+            Ok(load) => {
+                self.say(format!("armed for {}", load.mission.name));
+                self.load = Some(load);
+                self.phase = Phase::Armed;
+                self.send(FromVehicle::Armed { digest });
+            }
+            Err(reason) => {
+                self.say(format!("mission refused: {reason}"));
+                self.send(FromVehicle::Refused { digest, reason });
+            }
+        }
+    }
+
+    /// Checks for itself that the mission can be flown: what was uploaded need not have been checked by anyone.
+    fn accept(&self, text: &str) -> Result<Load, String> {
+        let mission = Arc::new(Mission::parse("the mission", text).map_err(|faults| faults.to_string())?);
+        let me = mission.index_of(&self.id).ok_or_else(|| {
+            let ids: Vec<&str> = mission.vehicles.iter().map(|v| v.id.as_str()).collect();
+            format!("mission {} is for {}, not for {}", mission.name, ids.join(", "), self.id)
+        })?;
+        mission.craft(me, mission.vehicles[me].start)?;
+        Ok(Load { mission, me, clock: None, speeds: Vec::new(), flight: None })
+    }
+
+    fn start(&mut self, digest: u64, clock: ClockPlan, speeds: Vec<SpeedCommand>) {
+        let Some(load) = self.load.as_mut().filter(|load| load.mission.digest == digest) else { return };
+        if self.phase != Phase::Armed {
+            return;
+        }
+        load.clock = Some(clock);
+        load.speeds = speeds;
+        self.outputs.push_back(NodeOutput::OpenLog(Opened(load.mission.clone())));
+        match clock {
+            ClockPlan::Real { .. } => self.outputs.push_back(NodeOutput::FollowClock(clock)),
+            ClockPlan::Stepped => match Flight::new(load.mission.clone(), load.me, false) {
+                Ok(flight) => {
+                    load.flight = Some(flight);
+                    self.phase = Phase::Running;
+                }
+                Err(reason) => self.abort(reason),
+            },
+        }
+    }
+
+    /// The clock runs: begin, or join the others where this vehicle should be by now.
+    fn clock_started(&mut self, now: Time, last: Option<&StateRow>) {
+        let Some(load) = self.load.as_mut().filter(|_| self.phase == Phase::Armed) else { return };
+        let late = now > Time::ZERO + load.mission.control_period * load.mission.message_ticks;
+        let flight = if late {
+            let start = rejoin_at(&load.mission, load.me, &load.speeds, now, last);
+            Flight::rejoin(load.mission.clone(), load.me, start, now)
+        } else {
+            Flight::new(load.mission.clone(), load.me, true)
+        };
+        match flight {
+            Ok(mut flight) => {
+                for command in &load.speeds {
+                    flight.handle(now, Some(FlightInput::Speed(*command)));
+                }
+                load.flight = Some(flight);
+                self.phase = Phase::Running;
+                let name = load.mission.name.clone();
+                self.say(if late { format!("joining {name} at {now}") } else { format!("flying {name}") });
+            }
+            Err(reason) => self.abort(reason),
+        }
+    }
+
+    fn speed(&mut self, command: SpeedCommand) {
+        if let Some(load) = self.load.as_mut().filter(|_| self.phase == Phase::Running) {
+            load.speeds.push(command);
+            if let Some(flight) = &mut load.flight {
+                flight.handle(command.at, Some(FlightInput::Speed(command)));
+            }
+        }
+    }
+
+    fn stop(&mut self) {
+        if self.phase == Phase::Running {
+            self.outputs.push_back(NodeOutput::CloseLog);
+        }
+        if matches!(self.phase, Phase::Running | Phase::Armed) {
+            self.phase = Phase::Aborted;
+            self.say("stopped".to_string());
+            self.send(FromVehicle::Ended { phase: Phase::Aborted, reason: "stopped".to_string() });
+        }
+    }
+
+    fn abort(&mut self, reason: String) {
+        self.phase = Phase::Aborted;
+        self.say(format!("flight aborted: {reason}"));
+        self.outputs.push_back(NodeOutput::CloseLog);
+        self.send(FromVehicle::Ended { phase: Phase::Aborted, reason });
+    }
+
+    /// Stepped clock: runs every control period up to `until`, then says so.
+    fn grant(&mut self, until: Time, heard: Vec<(Time, Vec<u8>)>, speeds: Vec<SpeedCommand>) {
+        let Some(flight) = self.load.as_mut().and_then(|load| load.flight.as_mut()) else { return };
+        if self.phase != Phase::Running {
+            return;
+        }
+        for command in speeds {
+            flight.handle(command.at, Some(FlightInput::Speed(command)));
+        }
+        let mut sent = Vec::new();
+        let mut rest = Vec::new();
+        let inputs = heard.into_iter().map(|(at, bytes)| (at, FlightInput::Heard(bytes)));
+        flight.run_until(until, inputs, |at, output| match output {
+            FlightOutput::Transmit(bytes) => sent.push((at, bytes)),
+            other => rest.push(other),
+        });
+        for output in rest {
+            if let FlightOutput::Record(row) = output {
+                self.outputs.push_back(NodeOutput::Record(row));
+            } else {
+                self.outcome(output);
+            }
+        }
+        self.send(FromVehicle::Reached { until, sent });
+    }
+
+    /// The flight has come to an end of some kind.
+    fn outcome(&mut self, output: FlightOutput) {
+        match output {
+            FlightOutput::Finished => {
+                self.phase = Phase::Finished;
+                self.say("flight finished".to_string());
+                self.outputs.push_back(NodeOutput::CloseLog);
+                self.send(FromVehicle::Ended { phase: Phase::Finished, reason: String::new() });
+            }
+            FlightOutput::Failed(reason) => self.abort(reason),
+            FlightOutput::Transmit(_) | FlightOutput::Record(_) => {}
+        }
+    }
+
+    fn drain_flight(&mut self) {
+        while let Some(output) = self.load.as_mut().and_then(|load| load.flight.as_mut()).and_then(Flight::poll_output)
+        {
+            match output {
+                FlightOutput::Transmit(bytes) => self.outputs.push_back(NodeOutput::Transmit(bytes)),
+                FlightOutput::Record(row) => self.outputs.push_back(NodeOutput::Record(row)),
+                end => self.outcome(end),
+            }
+        }
+    }
+}
+
+/// Where a vehicle that comes back begins: its body where it was last recorded (or at the mission's start), its virtual
+/// target where the formation should be by now.
+fn rejoin_at(mission: &Mission, me: usize, speeds: &[SpeedCommand], now: Time, last: Option<&StateRow>) -> Start {
+    let mut profile = mission.speed.clone();
+    speeds.iter().for_each(|command| profile.command(*command));
+    let travelled = |from: Time| mission.nominal_factor() * (profile.distance(now) - profile.distance(from));
+    let start = mission.vehicles[me].start;
+    match last {
+        Some(row) => Start {
+            position: [row.x_m, row.y_m, row.z_m],
+            yaw: row.yaw_rad,
+            speed: 0.0,
+            xi: row.xi + travelled(Time::from_nanos(row.t_ns)),
+        },
+        None => Start { xi: start.xi + travelled(Time::ZERO), ..start },
+    }
+}
+
+impl Machine for VehicleNode {
+    type Input = NodeInput;
+    type Output = NodeOutput;
+
+    fn handle(&mut self, now: Time, input: Option<NodeInput>) {
+        match input {
+            Some(NodeInput::Connected) => {
+                let plan = self.load.as_ref().and_then(|load| {
+                    let clock = load.clock?;
+                    Some(FlightPlan { mission: load.mission.text.clone(), clock, speeds: load.speeds.clone() })
+                });
+                self.send(FromVehicle::Hello { phase: self.phase, flight: plan });
+            }
+            Some(NodeInput::Lost) => {
+                let stepped =
+                    self.load.as_ref().is_some_and(|load| load.clock.is_some_and(|clock| clock == ClockPlan::Stepped));
+                if self.phase == Phase::Running && stepped {
+                    self.abort("lost the line in a stepped run".to_string());
+                }
+            }
+            Some(NodeInput::Message(message)) => self.message(message),
+            Some(NodeInput::ClockStarted { last }) => self.clock_started(now, last.as_deref()),
+            Some(NodeInput::Log(piece)) => self.send(FromVehicle::Log(piece)),
+            Some(NodeInput::Heard(bytes)) => {
+                if let Some(flight) = self.load.as_mut().and_then(|load| load.flight.as_mut()) {
+                    flight.handle(now, Some(FlightInput::Heard(bytes)));
+                }
+            }
+            None => {
+                if let Some(flight) = self.load.as_mut().and_then(|load| load.flight.as_mut()) {
+                    flight.handle(now, None);
+                }
+            }
+        }
+        if self.phase == Phase::Running {
+            self.drain_flight();
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<NodeOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        let load = self.load.as_ref().filter(|_| self.phase == Phase::Running)?;
+        match load.clock {
+            Some(ClockPlan::Real { .. }) => load.flight.as_ref().and_then(Flight::poll_timeout),
+            _ => None,
+        }
+    }
+}
