@@ -48,3 +48,5 @@ pub trait Craft: Send {
     /// True while every state is finite.
     fn is_sound(&self) -> bool;
 }
+
+pub mod auv;

@@ -1,1 +1,5 @@
 //! Plants: equations of motion, one per file.
+
+pub mod attitude;
+pub mod auv;
+pub mod sirene;
