@@ -10,6 +10,7 @@ pub mod following;
 pub mod graph;
 pub mod machine;
 pub mod path;
+mod positive;
 pub mod random;
 pub mod record;
 pub mod theory;

@@ -1,4 +1,25 @@
 //! Coordination laws, one per file.
+//!
+//! | law | source | equation | demand | hears | file |
+//! |---|---|---|---|---|---|
+//! | two vehicles on lines | section 1.2 | ẋ_i = −a_i (x_i − x_j) + v_L (1.5) | rate | ξ_j | [`introduction_1_5`] |
+//! | solution I | Proposition 3.4 | u = −(LC + C + A)η − ALξ (3.43) | acceleration | ξ_j, η_j/R_j | [`solution_1_3_43`] |
+//! | solution II | Proposition 3.4 | u = −Aη − BCLξ (3.44) | acceleration | ξ_j | [`solution_2_3_44`] |
+//! | solution III | Proposition 3.5 | u = −(A⁻¹L + A)Cη − B sat(η + A⁻¹Lξ) (3.45) | acceleration | ξ_j, η_j/R_j | [`solution_3_3_45`] |
+//! | switching network | Theorems 4.4 and 4.5 | v_r = v_L − k_i Σ(γ_i − γ_j) (4.21) | rate | γ_j | [`switching_4_21`] |
+//! | delay, never alone | Lemma 4.4 | v_r = v_L − k/\|N_i\| Σ(γ_i − γ_j(t−τ)) (4.34) | rate | γ_j | [`delayed_4_34`] |
+//! | delay, at times alone | Lemma 4.5 | (4.34), and v_L* when N_i is empty (4.42) | rate | γ_j | [`delayed_4_42`] |
+//!
+//! What all of them need of the neighbours is in [`disagreement`].
+
+pub mod delayed_4_34;
+pub mod delayed_4_42;
+pub mod disagreement;
+pub mod introduction_1_5;
+pub mod solution_1_3_43;
+pub mod solution_2_3_44;
+pub mod solution_3_3_45;
+pub mod switching_4_21;
 
 /// What the fleet is asked to do: the formation speed and its derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,3 +82,6 @@ pub trait CoordinationLaw: Send + Sync + std::fmt::Debug {
         false
     }
 }
+
+#[cfg(test)]
+mod ideal_fleet;

@@ -2,6 +2,26 @@
 //!
 //! A path is `p(ξ)`. The parameter `ξ` *is* the coordination state (γ in chapter 4); formations are
 //! parametrisations, so that vehicles are coordinated exactly when their parameters agree.
+//!
+//! | path | source | equation | file |
+//! |---|---|---|---|
+//! | straight line | section 1.2 | p = p₀ + ρ ξ (cos ψ, sin ψ, 0) | [`line`] |
+//! | circle | Figure 1.5, Figure 3.10 | p = c + R (cos(θ₀ ± ρ ξ), sin(θ₀ ± ρ ξ), 0) | [`circle`] |
+//! | sinusoid | Figure 3.9 | y = y₀ + a sin(2π x/λ + φ), x = ξ | [`sinusoid`] |
+//! | helix | section 4.6 | p = (c₁ cos(2π ξ/T + φ), c₁ sin(2π ξ/T + φ), c₂ ξ + z₀) | [`helix`] |
+//! | lines and arcs joined | Figures 3.7 and 3.8, Remark 3.8 | R_i constant on each segment | [`chain`] |
+//!
+//! What follows from p', p'' and p''' (R, heading, curvature) is in [`geometry`], the point closest to a vehicle in
+//! [`closest`], and what a law may ask of a path as a whole in [`shape`].
+
+pub mod chain;
+pub mod circle;
+pub mod closest;
+pub mod geometry;
+pub mod helix;
+pub mod line;
+pub mod shape;
+pub mod sinusoid;
 
 use nalgebra::Vector3;
 
@@ -25,4 +45,13 @@ pub trait Path: Send + Sync + std::fmt::Debug {
 
     /// The range of `xi` in which to look for the point closest to a vehicle at the start; one lap of a closed path.
     fn search_range(&self) -> (f64, f64);
+
+    /// The parameters at which the direction of the tangent jumps. A law that turns a vehicle with bounded effort
+    /// cannot follow such a path without error.
+    fn tangent_breaks(&self) -> &[f64] {
+        &[]
+    }
 }
+
+#[cfg(test)]
+mod check;

@@ -3,3 +3,14 @@
 pub mod attitude;
 pub mod auv;
 pub mod sirene;
+//!
+//! | plant | source | equation | file |
+//! |---|---|---|---|
+//! | kinematic unicycle | section 1.2 | ẋ = v cos ψ, ẏ = v sin ψ; v and ψ are the inputs | [`kinematic_unicycle`] |
+//! | dynamic unicycle | section 3.2.1, (3.12) | v̇ = F/m, ṙ = N/I | [`dynamic_unicycle`] |
+//!
+//! Every model has its arguments in the order `(t, x, u, params)`; [`integrate`] holds the inputs and integrates.
+
+pub mod dynamic_unicycle;
+pub mod integrate;
+pub mod kinematic_unicycle;
