@@ -9,6 +9,7 @@ pub mod craft;
 pub mod following;
 pub mod graph;
 pub mod machine;
+pub mod mission;
 pub mod path;
 mod positive;
 pub mod random;

@@ -1,1 +1,4 @@
-//! Placeholder.
+//! Mission control: checks, simulates, runs, watches, collects and reports flights.
+
+pub mod conduct;
+pub mod simulate;

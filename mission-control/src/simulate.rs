@@ -133,7 +133,7 @@ impl Fleet<'_> {
                 | HubOutput::Say(_) => {}
             }
         }
-        self.now = self.now.max(self.hub.reached());
+        self.now = self.now.max(self.hub.mission_time());
     }
 
     fn drain_node(&mut self, index: usize, record: &mut impl FnMut(Row)) {

@@ -129,7 +129,7 @@ impl Hub {
     }
 
     /// Mission time up to which a stepped run is complete.
-    pub fn reached(&self) -> Time {
+    pub fn mission_time(&self) -> Time {
         self.load.as_ref().map_or(Time::ZERO, |load| load.now)
     }
 

@@ -50,3 +50,5 @@ pub trait Craft: Send {
 }
 
 pub mod auv;
+pub mod kinematic;
+pub mod robot;

@@ -1,16 +1,18 @@
 //! The mission: the file as written ([`file`]), and the checked form that the machines fly.
 
+mod build;
 mod check;
 mod fault;
 pub mod file;
+mod shape;
 mod speed;
 
 use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-pub use check::schema;
 pub use fault::{Fault, Faults};
+pub use shape::schema;
 pub use speed::SpeedProfile;
 
 use crate::coordination::CoordinationLaw;
@@ -178,6 +180,6 @@ impl Mission {
     /// # Errors
     /// Why the vehicle cannot be built; the check has excluded it for the mission's own start.
     pub fn craft(&self, vehicle: usize, start: Start) -> Result<Box<dyn Craft>, String> {
-        check::craft(&self.vehicles[vehicle], start, self.nominal_factor(), self.speed.fastest(), self.law.kind())
+        build::craft(&self.vehicles[vehicle], start, self.nominal_factor(), self.speed.fastest(), self.law.kind())
     }
 }
