@@ -1,0 +1,176 @@
+//! The logs of one process: a folder with one folder per mission, in it one file per life of the process. Rows are
+//! written on a thread of their own, so that a slow disk does not delay a control loop.
+
+use std::fs::{self, File};
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use common::mission::Mission;
+use common::record::{Record, Row, StateRow};
+use common::wire::vehicle::LogPiece;
+
+use crate::recording::{FLUSH_PERIOD, Origin, Recorder, RowReader};
+
+/// Rows that wait for the disk; beyond it the process waits too.
+const QUEUE: usize = 1 << 16;
+/// Bytes of a log sent at a time.
+const PIECE: usize = 512 << 10;
+
+/// Where a recording comes from.
+pub fn origin(mission: &Mission) -> Origin {
+    Origin { mission_toml: mission.text.clone(), digest: format!("{:016x}", mission.digest), seed: mission.seed }
+}
+
+/// The logs of one process.
+pub struct Logs {
+    folder: PathBuf,
+    stem: String,
+    open: Option<Open>,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+struct Open {
+    digest: u64,
+    rows: SyncSender<Row>,
+    writer: JoinHandle<()>,
+}
+
+impl Logs {
+    /// Logs of the process called `stem`, below `folder`.
+    pub fn new(folder: impl Into<PathBuf>, stem: &str) -> Logs {
+        Logs { folder: folder.into(), stem: stem.to_string(), open: None, failure: Arc::default() }
+    }
+
+    fn folder_of(&self, digest: u64) -> PathBuf {
+        self.folder.join(format!("{digest:016x}"))
+    }
+
+    /// Files of a mission, in the order in which they were begun.
+    fn files(&self, digest: u64) -> Vec<PathBuf> {
+        let folder = self.folder_of(digest);
+        let name = |life: u32| match life {
+            1 => format!("{}.mcap", self.stem),
+            _ => format!("{}-{life}.mcap", self.stem),
+        };
+        (1..).map(|life| folder.join(name(life))).take_while(|path| path.exists()).collect()
+    }
+
+    /// Begins a log of this mission. If `fresh`, what earlier flights of the same mission left is set aside; otherwise it
+    /// is kept, and the last state in it is returned.
+    ///
+    /// # Errors
+    /// Why the file cannot be made.
+    pub fn open(&mut self, mission: &Mission, fresh: bool) -> Result<Option<StateRow>, String> {
+        self.close();
+        let folder = self.folder_of(mission.digest);
+        let refused = |error: &dyn std::fmt::Display| format!("cannot record in {}: {error}", folder.display());
+        fs::create_dir_all(&folder).map_err(|error| refused(&error))?;
+        let earlier = self.files(mission.digest);
+        let mut last = None;
+        if fresh {
+            for file in &earlier {
+                fs::remove_file(file).map_err(|error| refused(&error))?;
+            }
+        } else {
+            last = earlier.iter().rev().find_map(|file| last_state(file));
+        }
+        let (path, recorder) =
+            Recorder::create_next(&folder, &self.stem, &origin(mission)).map_err(|error| refused(&error))?;
+        tracing::debug!("recording in {}", path.display());
+        let (rows, queue) = sync_channel(QUEUE);
+        let failure = Arc::clone(&self.failure);
+        let writer = std::thread::Builder::new()
+            .name("log".into())
+            .spawn(move || {
+                if let Err(error) = write_rows(recorder, &queue) {
+                    *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                    // Rows go on coming; they must not block the one who sends them.
+                    while queue.recv().is_ok() {}
+                }
+            })
+            .map_err(|error| refused(&error))?;
+        self.open = Some(Open { digest: mission.digest, rows, writer });
+        Ok(last)
+    }
+
+    /// Records a row, if a log is open.
+    pub fn write(&self, row: Row) {
+        if let Some(open) = &self.open {
+            // The writer only ends after this end of the channel is dropped.
+            let _ = open.rows.send(row);
+        }
+    }
+
+    /// Ends the log and waits until it is on disk.
+    pub fn close(&mut self) {
+        if let Some(Open { rows, writer, .. }) = self.open.take() {
+            drop(rows);
+            let _ = writer.join();
+        }
+    }
+
+    /// Why recording has stopped, told once.
+    pub fn take_failure(&self) -> Option<String> {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// A piece of a log of the mission with this digest; a piece of no file if there is none.
+    pub fn piece(&self, digest: u64, file: u32, offset: u64) -> LogPiece {
+        let files = self.files(digest);
+        // A log that is being written is not whole: it counts once the flight is over.
+        let count = if self.open.as_ref().is_some_and(|open| open.digest == digest) { 0 } else { files.len() as u32 };
+        let nothing = LogPiece { file, files: count, offset, size: 0, bytes: Vec::new() };
+        let Some(path) = files.get(file as usize).filter(|_| count > 0) else { return nothing };
+        match read_piece(path, offset) {
+            Ok((size, bytes)) => LogPiece { size, bytes, ..nothing },
+            Err(error) => {
+                tracing::warn!("cannot read {}: {error}", path.display());
+                nothing
+            }
+        }
+    }
+}
+
+impl Drop for Logs {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+fn write_rows(mut recorder: Recorder<std::io::BufWriter<File>>, queue: &Receiver<Row>) -> Result<(), String> {
+    let broken = |error: crate::recording::RecordingError| format!("recording has stopped: {error}");
+    loop {
+        match queue.recv_timeout(FLUSH_PERIOD) {
+            Ok(row) => recorder.write(&row).map_err(broken)?,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                recorder.finish().map_err(broken)?;
+                return Ok(());
+            }
+        }
+        recorder.flush_if_due(Instant::now()).map_err(broken)?;
+    }
+}
+
+fn read_piece(path: &Path, offset: u64) -> std::io::Result<(u64, Vec<u8>)> {
+    let mut file = File::open(path)?;
+    let size = file.metadata()?.len();
+    file.seek(SeekFrom::Start(offset))?;
+    let mut bytes = Vec::with_capacity(PIECE.min(size.saturating_sub(offset) as usize));
+    file.take(PIECE as u64).read_to_end(&mut bytes)?;
+    Ok((size, bytes))
+}
+
+/// The last state that a log holds.
+fn last_state(path: &Path) -> Option<StateRow> {
+    let reader = RowReader::open(path).ok()?;
+    let states = reader.filter_map(|row| match row {
+        Ok(Row::Exact(Record::State(state))) => Some(state),
+        _ => None,
+    });
+    states.last()
+}
