@@ -5,7 +5,7 @@
 //!
 //! | path | source | equation | file |
 //! |---|---|---|---|
-//! | straight line | section 1.2 | p = p₀ + ρ ξ (cos ψ, sin ψ, 0) | [`line`] |
+//! | straight line | section 1.2 | p = p₀ + ρ ξ (cos ψ, sin ψ, 0) | [`mod@line`] |
 //! | circle | Figure 1.5, Figure 3.10 | p = c + R (cos(θ₀ ± ρ ξ), sin(θ₀ ± ρ ξ), 0) | [`circle`] |
 //! | sinusoid | Figure 3.9 | y = y₀ + a sin(2π x/λ + φ), x = ξ | [`sinusoid`] |
 //! | helix | section 4.6 | p = (c₁ cos(2π ξ/T + φ), c₁ sin(2π ξ/T + φ), c₂ ξ + z₀) | [`helix`] |

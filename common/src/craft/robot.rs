@@ -1,0 +1,429 @@
+//! The wheeled robot of chapter 3: a dynamic unicycle that follows a virtual target by Proposition 3.1.
+
+use std::sync::Arc;
+
+use super::{Craft, Observation};
+use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
+use crate::following::proposition_3_1::{Bend, Errors, Motion, Proposition31, Sense};
+use crate::path::shape::is_planar;
+use crate::path::{Path, PathPoint};
+use crate::positive::{finite, positive};
+use crate::vehicle::dynamic_unicycle::{Input, Parameters, State, model};
+use crate::vehicle::integrate::advance;
+
+/// What coordination commands: the mission's choice of law decides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SpeedLoop {
+    /// The derivative of the speed-tracking error, (3.39): laws of chapter 3.
+    Acceleration,
+    /// The rate v_r of the virtual target, (4.21): the robot's speed is driven to R v_r.
+    Rate {
+        /// k₀, rate at which the speed comes to R v_r \[1/s\], positive; well above the gain of coordination.
+        k_0: f64,
+    },
+}
+
+impl SpeedLoop {
+    /// The forward acceleration F/m that `demand` asks for, the speed that is wanted, and the rate that is recorded;
+    /// nothing if the demand is of the other kind.
+    fn answer(
+        self,
+        demand: Demand,
+        reference: SpeedReference,
+        target: &PathPoint,
+        v: f64,
+        xi_rate: f64,
+    ) -> Option<Answer> {
+        let (r, r_dot) = (target.r(), target.dr_dxi() * xi_rate);
+        let SpeedReference { v_l, v_l_dot } = reference;
+        match (self, demand) {
+            // F/m = u + R'(ξ) ξ̇ v_L + R v̇_L with the actual ξ̇ (3.39), erratum 3.7.
+            (SpeedLoop::Acceleration, Demand::Acceleration(u)) => {
+                Some(Answer { v_dot: u + r_dot * v_l + r * v_l_dot, wanted: r * v_l, v_ref: v_l })
+            }
+            // F/m = d/dt(R v_r) − k₀ (v − R v_r); the derivative of v_r itself is not known and left out.
+            (SpeedLoop::Rate { k_0 }, Demand::Rate(v_r)) => {
+                Some(Answer { v_dot: r_dot * v_r - k_0 * (v - r * v_r), wanted: r * v_r, v_ref: v_r })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// See [`SpeedLoop::answer`].
+struct Answer {
+    v_dot: f64,
+    wanted: f64,
+    v_ref: f64,
+}
+
+/// What is held between two evaluations of the law.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    input: Input,
+    xi_rate: f64,
+    v_ref: f64,
+}
+
+/// A wheeled robot under Proposition 3.1.
+#[derive(Debug)]
+pub struct RobotCraft {
+    path: Arc<dyn Path>,
+    law: Proposition31,
+    speed_loop: SpeedLoop,
+    parameters: Parameters,
+    state: State,
+    /// Parameter of the virtual target, and the path there.
+    xi: f64,
+    target: PathPoint,
+    sense: Sense,
+    held: Held,
+}
+
+impl RobotCraft {
+    /// The robot in `state` with its virtual target at `xi`. The path must lie in a horizontal plane and have no
+    /// corners; a robot without mass is refused.
+    pub fn new(
+        path: Arc<dyn Path>,
+        law: Proposition31,
+        speed_loop: SpeedLoop,
+        parameters: Parameters,
+        state: State,
+        xi: f64,
+    ) -> Result<RobotCraft, String> {
+        if !is_planar(&*path) {
+            return Err("a wheeled robot follows paths in a horizontal plane only".to_owned());
+        }
+        if let [corner, ..] = path.tangent_breaks() {
+            return Err(format!("a wheeled robot cannot follow the corner of its path at xi = {corner}"));
+        }
+        if let SpeedLoop::Rate { k_0 } = speed_loop {
+            positive("the gain k_0", k_0)?;
+        }
+        state.to_vector().iter().try_for_each(|&x| finite("the robot's state", x).map(drop))?;
+        let (target, parameters) = (path.at(finite("the robot's xi", xi)?), parameters.checked()?);
+        let (sense, held) = (Sense::default(), Held::default());
+        Ok(RobotCraft { path, law, speed_loop, parameters, state, xi, target, sense, held })
+    }
+
+    fn errors(&self) -> Errors {
+        Errors::of(&self.target, self.state.x, self.state.y, self.state.heading)
+    }
+
+    fn move_target(&mut self, xi: f64) {
+        self.xi = xi;
+        self.target = self.path.at(xi);
+    }
+}
+
+impl Craft for RobotCraft {
+    fn takes(&self) -> DemandKind {
+        match self.speed_loop {
+            SpeedLoop::Acceleration => DemandKind::Acceleration,
+            SpeedLoop::Rate { .. } => DemandKind::Rate,
+        }
+    }
+
+    /// With η = v − R v_L (3.38), or zero for a robot that takes a rate.
+    fn own(&self, reference: SpeedReference) -> Own {
+        let r = self.target.r();
+        let eta = match self.speed_loop {
+            SpeedLoop::Acceleration => self.state.speed - r * reference.v_l,
+            SpeedLoop::Rate { .. } => 0.0,
+        };
+        Own { xi: self.xi, eta, r }
+    }
+
+    fn command(&mut self, reference: SpeedReference, demand: Demand) {
+        let (v, e) = (self.state.speed, self.errors());
+        // ξ̇ = ṡ/R = (v cos ψ_e + k₃ x_e)/R (3.35)
+        let xi_rate = self.law.target_speed(&e, v) / self.target.r();
+        let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v, xi_rate) else { return };
+        self.sense = self.law.sense(self.sense, v, answer.wanted);
+        let motion = Motion { v, v_dot: answer.v_dot, r: self.state.turn_rate };
+        let steering = self.law.steer(&e, &motion, &Bend::of(&self.target), self.sense);
+        let Parameters { mass, inertia } = self.parameters;
+        let input = Input { force: mass * answer.v_dot, torque: inertia * steering.r_dot };
+        self.held = Held { input, xi_rate, v_ref: answer.v_ref };
+    }
+
+    fn advance(&mut self, dt: f64, substeps: usize) {
+        let state = self.state.to_vector();
+        self.state = State::from_vector(advance(model, &state, &self.held.input, &self.parameters, dt, substeps));
+        self.move_target(self.xi + self.held.xi_rate * dt);
+    }
+
+    fn observe(&self) -> Observation {
+        let e = self.errors();
+        Observation {
+            xi: self.xi,
+            xi_rate: self.held.xi_rate,
+            v_ref: self.held.v_ref,
+            position: [self.state.x, self.state.y, self.target.p.z],
+            attitude: [self.state.heading, 0.0, 0.0],
+            speed: self.state.speed,
+            e_along: e.x_e,
+            e_cross: e.y_e,
+            e_norm: e.x_e.hypot(e.y_e),
+            psi_e: e.psi_e,
+        }
+    }
+
+    fn place_target(&mut self, xi: f64) {
+        self.move_target(xi);
+    }
+
+    fn is_sound(&self) -> bool {
+        let Held { input, xi_rate, v_ref } = self.held;
+        [self.xi, input.force, input.torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
+            && self.state.to_vector().iter().all(|x| x.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    use std::sync::Arc;
+
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    use super::{RobotCraft, SpeedLoop};
+    use crate::coordination::solution_1_3_43::SolutionOne;
+    use crate::coordination::solution_2_3_44::SolutionTwo;
+    use crate::coordination::solution_3_3_45::SolutionThree;
+    use crate::coordination::switching_4_21::Switching;
+    use crate::coordination::{CoordinationLaw, Demand, DemandKind, Neighbour, SpeedReference};
+    use crate::craft::Craft;
+    use crate::following::proposition_3_1::{Approach, Gains, Proposition31};
+    use crate::path::Path;
+    use crate::path::chain::{Chain, Segment};
+    use crate::path::circle::{Circle, Turn};
+    use crate::path::closest::closest_parameter;
+    use crate::path::helix::Helix;
+    use crate::path::line::Line;
+    use crate::path::sinusoid::Sinusoid;
+    use crate::vehicle::dynamic_unicycle::{Parameters, State};
+
+    const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
+    const PARAMETERS: Parameters = Parameters { mass: 5.0, inertia: 0.4 };
+
+    fn robot_with(
+        path: impl Path + 'static,
+        speed_loop: SpeedLoop,
+        gains: Gains,
+        x: f64,
+        y: f64,
+        heading: f64,
+    ) -> RobotCraft {
+        let xi = closest_parameter(&path, Vector3::new(x, y, 0.0), true);
+        let state = State { x, y, heading, ..State::default() };
+        let law = Proposition31::new(gains).unwrap();
+        RobotCraft::new(Arc::new(path), law, speed_loop, PARAMETERS, state, xi).unwrap()
+    }
+
+    fn robot(path: impl Path + 'static, x: f64, y: f64, heading: f64) -> RobotCraft {
+        robot_with(path, SpeedLoop::Acceleration, Gains::default(), x, y, heading)
+    }
+
+    /// The fleet `seconds` later, without delay; everybody's values are those at the start of the period.
+    fn run<const N: usize>(
+        mut fleet: [RobotCraft; N],
+        law: &dyn CoordinationLaw,
+        hears: [&[usize]; N],
+        seconds: f64,
+        period: f64,
+    ) -> [RobotCraft; N] {
+        for _ in 0..(seconds / period).round() as usize {
+            let own = fleet.each_ref().map(|craft| craft.own(REFERENCE));
+            for (i, craft) in fleet.iter_mut().enumerate() {
+                let heard: Vec<_> =
+                    hears[i].iter().map(|&j| Neighbour { xi: own[j].xi, eta_over_r: own[j].eta / own[j].r }).collect();
+                craft.command(REFERENCE, law.demand(REFERENCE, &own[i], &heard));
+                craft.advance(period, 2);
+                assert!(craft.is_sound());
+            }
+        }
+        fleet
+    }
+
+    fn alone(craft: RobotCraft, seconds: f64) -> RobotCraft {
+        let [craft] = run([craft], &SolutionTwo::new(1.0, 1.0).unwrap(), [&[]], seconds, 0.02);
+        craft
+    }
+
+    #[test]
+    fn a_line_is_followed_at_v_l() {
+        let gains = Gains { approach: Approach::Arctangent { psi_a: FRAC_PI_2, length: 0.5 }, ..Gains::default() };
+        for gains in [Gains::default(), gains] {
+            let line = Line::new(Vector3::new(0.0, 1.0, 0.0), 0.3, 2.0).unwrap();
+            let craft = alone(robot_with(line, SpeedLoop::Acceleration, gains, 0.0, 0.0, -0.5), 150.0);
+            let seen = craft.observe();
+            assert!(seen.e_norm < 1e-4 && seen.psi_e.abs() < 1e-4, "{seen:?}");
+            assert!((seen.speed - 0.2).abs() < 1e-9 && (seen.xi_rate - 0.1).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_circle_is_followed_alike_in_either_sense() {
+        let circle = |turn| Circle::new(Vector3::zeros(), 2.0, turn, 0.0, 1.0).unwrap();
+        let mut left = robot(circle(Turn::Left), 2.7, -0.4, 1.0);
+        let mut right = robot(circle(Turn::Right), 2.7, 0.4, -1.0);
+        for _ in 0..60 {
+            (left, right) = (alone(left, 1.0), alone(right, 1.0));
+            let (one, two) = (left.observe(), right.observe());
+            assert!((one.e_cross + two.e_cross).abs() < 1e-9 && (one.psi_e + two.psi_e).abs() < 1e-9);
+            assert!((one.e_along - two.e_along).abs() < 1e-9 && (one.xi - two.xi).abs() < 1e-9);
+        }
+        let seen = alone(left, 60.0).observe();
+        assert!(seen.e_norm < 1e-3 && (seen.speed - 0.2).abs() < 1e-9, "{seen:?}");
+    }
+
+    /// Figure 3.9: one robot weaves, the other drives beside it along y = −1.
+    fn figure_3_9(wavelength: f64, seconds: f64, period: f64) -> [RobotCraft; 2] {
+        let weaving = robot(Sinusoid::new(1.0, 1.0, wavelength, 0.0, 0.0).unwrap(), -0.2, 0.5, 0.5);
+        let straight = robot(Line::new(Vector3::new(0.0, -1.0, 0.0), 0.0, 1.0).unwrap(), 0.2, -1.3, 0.0);
+        run([weaving, straight], &SolutionOne::new(1.0).unwrap(), [&[1], &[0]], seconds, period)
+    }
+
+    #[test]
+    fn figure_3_9_keeps_the_robots_side_by_side() {
+        let [weaving, straight] = figure_3_9(1.0, 60.0, 0.02).map(|craft| craft.observe());
+        // Curvatures up to 39.5 per metre under a held control leave about a centimetre (erratum 3.19).
+        assert!((weaving.xi - straight.xi).abs() < 2e-3, "{} {}", weaving.xi, straight.xi);
+        assert!(weaving.e_norm < 0.03 && straight.e_norm < 1e-3, "{weaving:?} {straight:?}");
+    }
+
+    #[test]
+    fn what_a_held_control_leaves_on_the_sinusoid_shrinks_with_the_period() {
+        let worst = |period: f64| {
+            let mut fleet = figure_3_9(1.0, 40.0, period);
+            let mut worst = 0f64;
+            for _ in 0..100 {
+                fleet = run(fleet, &SolutionOne::new(1.0).unwrap(), [&[1], &[0]], 0.2, period);
+                worst = worst.max(fleet[0].observe().e_cross.abs());
+            }
+            worst
+        };
+        let (coarse, fine) = (worst(0.02), worst(0.005));
+        assert!(fine < 0.5 * coarse && coarse < 0.05, "{coarse} {fine}");
+    }
+
+    #[test]
+    fn figure_3_7_stays_in_line_through_arcs_and_lines() {
+        let path = |radii: [f64; 2]| {
+            let arc = |radius, sweep: f64| Segment::Arc { radius, sweep, xi_length: sweep.abs() };
+            let line = Segment::Line { length: 3.0, xi_length: 3.0 };
+            let segments = [arc(radii[0], FRAC_PI_2), line, arc(radii[1], -FRAC_PI_2), line];
+            Chain::new(Vector3::new(0.0, -radii[0], 0.0), 0.0, &segments).unwrap()
+        };
+        let fleet = [
+            robot(path([2.0, 4.0]), 0.0, -2.2, 0.0),
+            robot(path([3.0, 3.0]), 0.4, -2.8, 0.0),
+            robot(path([4.0, 2.0]), 0.0, -3.9, 0.0),
+        ];
+        let law = SolutionThree::new(1.0, 0.25, 1.0).unwrap();
+        // At each joint η jumps with R and coordination is disturbed anew (erratum 3.18).
+        let seen = run(fleet, &law, [&[1, 2], &[0], &[0]], 140.0, 0.02).map(|craft| craft.observe());
+        for craft in seen {
+            assert!((craft.xi - seen[0].xi).abs() < 1e-3 && craft.e_norm < 1e-2, "{craft:?}");
+        }
+        assert!(seen[0].xi > PI + 3.0, "the last line is reached");
+    }
+
+    #[test]
+    fn a_rate_is_followed_by_the_speed() {
+        let speed_loop = SpeedLoop::Rate { k_0: 2.0 };
+        let circle = |radius| Circle::new(Vector3::zeros(), radius, Turn::Left, 0.0, 1.0).unwrap();
+        let fleet = [
+            robot_with(circle(2.0), speed_loop, Gains::default(), 2.1, 0.0, FRAC_PI_2),
+            robot_with(circle(3.0), speed_loop, Gains::default(), 3.0, 0.5, FRAC_PI_2),
+        ];
+        let fleet = run(fleet, &Switching::new(0.2).unwrap(), [&[1], &[0]], 80.0, 0.02);
+        let [one, two] = fleet.map(|craft| craft.observe());
+        assert!((one.xi - two.xi).abs() < 1e-4 && (one.v_ref - 0.1).abs() < 1e-4, "{one:?} {two:?}");
+        assert!((one.speed - 0.2).abs() < 1e-4 && (two.speed - 0.3).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_force_of_3_39_makes_eta_dot_equal_u() {
+        // With R changing along the path and v_L changing in time.
+        let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
+        let start = path.at(0.3);
+        let mut craft = robot(path.clone(), start.p.x, start.p.y, start.heading());
+        craft.state.speed = 0.4;
+        let dt = 1e-5;
+        let at = |t: f64| SpeedReference { v_l: 0.1 + 0.05 * t, v_l_dot: 0.05 };
+        let before = craft.own(at(0.0)).eta;
+        craft.command(at(0.0), Demand::Acceleration(0.3));
+        craft.advance(dt, 1);
+        let eta_dot = (craft.own(at(dt)).eta - before) / dt;
+        assert!((eta_dot - 0.3).abs() < 1e-4, "{eta_dot}");
+        assert!(path.at(0.3).dr_dxi().abs() > 0.05, "else nothing is tested");
+    }
+
+    #[test]
+    fn mass_and_inertia_scale_the_efforts_and_change_no_motion() {
+        let circle = || Circle::new(Vector3::zeros(), 2.0, Turn::Left, 0.0, 1.0).unwrap();
+        let mut heavy = robot(circle(), 2.3, 0.0, 1.0);
+        let mut unit = robot(circle(), 2.3, 0.0, 1.0);
+        unit.parameters = Parameters { mass: 1.0, inertia: 1.0 };
+        for _ in 0..100 {
+            for craft in [&mut heavy, &mut unit] {
+                craft.command(REFERENCE, Demand::Acceleration(0.01));
+                craft.advance(0.02, 1);
+            }
+        }
+        assert!((heavy.held.input.force - 5.0 * unit.held.input.force).abs() < 1e-9);
+        assert!((heavy.held.input.torque - 0.4 * unit.held.input.torque).abs() < 1e-9);
+        assert!((heavy.observe().e_cross - unit.observe().e_cross).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_demand_of_the_other_kind_is_ignored() {
+        let line = || Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
+        let mut craft = robot(line(), 0.0, 0.5, 0.0);
+        assert_eq!(craft.takes(), DemandKind::Acceleration);
+        craft.command(REFERENCE, Demand::Acceleration(0.2));
+        let held = craft.held.input;
+        craft.command(REFERENCE, Demand::Rate(3.0));
+        assert_eq!(craft.held.input, held);
+        let craft = robot_with(line(), SpeedLoop::Rate { k_0: 1.0 }, Gains::default(), 0.0, 0.5, 0.0);
+        assert_eq!((craft.takes(), craft.own(REFERENCE).eta), (DemandKind::Rate, 0.0));
+    }
+
+    #[test]
+    fn the_target_can_be_placed() {
+        let mut craft = robot(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap(), 1.0, 0.5, 0.0);
+        craft.place_target(3.0);
+        let seen = craft.observe();
+        assert!((seen.xi, seen.e_along) == (3.0, -5.0) && (seen.e_cross - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn paths_that_a_robot_cannot_follow_are_refused() {
+        let refusal = |path: Arc<dyn Path>| {
+            let law = Proposition31::new(Gains::default()).unwrap();
+            RobotCraft::new(path, law, SpeedLoop::Acceleration, PARAMETERS, State::default(), 0.0).unwrap_err()
+        };
+        assert!(refusal(Arc::new(Helix::new(2.0, 10.0, 0.0, 0.1, 0.0).unwrap())).contains("plane"));
+        let line = Segment::Line { length: 1.0, xi_length: 1.0 };
+        let corner = Chain::new(Vector3::zeros(), 0.0, &[line, Segment::Corner { angle: 1.0 }, line]).unwrap();
+        assert!(refusal(Arc::new(corner)).contains("xi = 1"));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn turning_and_moving_the_world_changes_nothing(turn in -PI..PI, east in -9.0..9.0f64, north in -9.0..9.0f64) {
+            let circle = |x, y, angle| Circle::new(Vector3::new(x, y, 0.0), 2.0, Turn::Left, angle, 1.0).unwrap();
+            let (sin, cos) = turn.sin_cos();
+            let here = alone(robot(circle(0.0, 0.0, 0.0), 2.5, 1.0, 0.4), 10.0).observe();
+            let (x, y) = (east + 2.5 * cos - sin, north + 2.5 * sin + cos);
+            let there = alone(robot(circle(east, north, turn), x, y, 0.4 + turn), 10.0).observe();
+            prop_assert!((here.e_cross - there.e_cross).abs() < 1e-8 && (here.psi_e - there.psi_e).abs() < 1e-8);
+            prop_assert!((here.xi - there.xi).abs() < 1e-8 && (here.speed - there.speed).abs() < 1e-12);
+        }
+    }
+}
