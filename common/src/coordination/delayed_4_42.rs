@@ -47,7 +47,7 @@ mod tests {
     use super::DelayedAlone;
     use crate::coordination::delayed_4_34::Delayed;
     use crate::coordination::ideal_fleet::{
-        Fleet, Network, STAR, assert_shift_invariant_and_ahead_slows_down as assert_sane,
+        Fleet, Network, STAR, assert_shift_invariant_and_ahead_slows_down as assert_sane, run_delayed_with,
     };
     use crate::coordination::{CoordinationLaw, Demand, Own, SpeedReference};
 
@@ -66,44 +66,39 @@ mod tests {
         assert!(speeds.iter().all(|speed| (speed - V_L_STAR).abs() < 1e-3 * V_L_STAR), "{speeds:?}");
     }
 
-    /// Section 4.6: all links are up for t mod 10 in [7.5, 10) (erratum 4.23).
-    fn with_outages(law: &dyn CoordinationLaw, lonely: impl Fn(usize) -> bool) -> (f64, f64) {
-        let dt = 0.05;
-        let mut late = vec![START; 100];
-        let mut fleet = START;
-        for step in 0..32_000 {
-            let up = step % 200 >= 150;
-            let heard = late[step % 100].clone();
-            late[step % 100] = fleet.clone();
-            let now = fleet.clone();
-            let reference = SpeedReference { v_l: 0.5, v_l_dot: 0.0 };
-            for i in 0..3 {
-                let neighbours: Vec<_> = STAR[i]
-                    .iter()
-                    .filter(|_| up || !lonely(i))
-                    .map(|&j| crate::coordination::Neighbour { xi: heard.xi[j], eta_over_r: 0.0 })
-                    .collect();
-                let own = Own { xi: now.xi[i], eta: 0.0, r: 1.0 };
-                let Demand::Rate(v_r) = law.demand(reference, &own, &neighbours) else { unreachable!() };
-                fleet.xi[i] = now.xi[i] + dt * v_r;
-            }
-        }
-        (fleet.spread(), (fleet.xi[0] - START.xi[0]) / (32_000.0 * dt))
+    /// Section 4.6: the links are up for t mod 10 in [7.5, 10) (erratum 4.23), and otherwise as in `cut`. The spread
+    /// at the end, and the mean speed of the last 400 seconds.
+    fn with_outages(law: &dyn CoordinationLaw, cut: [&[usize]; 3]) -> (f64, f64) {
+        let cut = Network { hears: cut, ..SECTION_4_6 };
+        let v_r = |t: f64, i: usize, now: &Fleet<3>, heard: &Fleet<3>| {
+            let network = if t % 10.0 < 7.5 { &cut } else { &SECTION_4_6 };
+            network.v_r(law, i, now, heard)
+        };
+        let after = |seconds| run_delayed_with(START, seconds, 5.0, 0.05, v_r).0;
+        let (agreed, end) = (after(800.0), after(1200.0));
+        (end.spread(), (end.xi[0] - agreed.xi[0]) / 400.0)
     }
 
     #[test]
     fn five_seconds_late_through_windows_of_two_and_a_half() {
-        let (spread, speed) = with_outages(&law(), |_| true);
+        let (spread, speed) = with_outages(&law(), [&[], &[], &[]]);
         assert!(spread < 1e-3, "{spread}");
-        assert!((speed - V_L_STAR).abs() < 0.02 * V_L_STAR, "{speed}");
+        assert!((speed - V_L_STAR).abs() < 1e-3 * V_L_STAR, "{speed}");
     }
 
     #[test]
     fn v_l_star_matters_when_one_vehicle_is_cut_off_alone() {
         // Erratum 4.24: with v_L in place of v_L*, cutting off one vehicle costs coordination.
-        let alone = |i| i == 0;
-        assert!(with_outages(&law(), alone).0 < 1e-3);
-        assert!(with_outages(&Delayed::new(0.1).unwrap(), alone).0 > 1.0);
+        let first_alone: [&[usize]; 3] = [&[], &[2], &[1]];
+        assert!(with_outages(&law(), first_alone).0 < 1e-3);
+        let (spread, _) = with_outages(&Delayed::new(0.1).unwrap(), first_alone);
+        assert!(spread > 3.0, "{spread}");
+    }
+
+    #[test]
+    fn when_all_are_cut_off_together_it_costs_only_the_speed() {
+        let (spread, speed) = with_outages(&Delayed::new(0.1).unwrap(), [&[], &[], &[]]);
+        assert!(spread < 1e-3 && (speed - 0.4447).abs() < 1e-3, "{spread} {speed}");
     }
 
     #[test]
@@ -111,11 +106,11 @@ mod tests {
         // Erratum 4.1: v_L + k/|N_i| Σ (γ_j(t) − γ_j(t − τ)) does not see γ_i at all; the fleet keeps its errors
         // and travels at v_L/(1 − kτ) = 1.
         let start = Fleet::at([15.0, 5.0, 0.0]);
-        let printed = |i: usize, now: &Fleet<3>, heard: &Fleet<3>| {
+        let printed = |_: f64, i: usize, now: &Fleet<3>, heard: &Fleet<3>| {
             let change: f64 = STAR[i].iter().map(|&j| now.xi[j] - heard.xi[j]).sum();
             0.5 + 0.1 / STAR[i].len() as f64 * change
         };
-        let (end, speeds) = SECTION_4_6.run_delayed_with(start, 400.0, 5.0, 0.05, printed);
+        let (end, speeds) = run_delayed_with(start, 400.0, 5.0, 0.05, printed);
         assert!((end.xi[0] - end.xi[1] - 10.0).abs() < 1e-9 && (end.xi[1] - end.xi[2] - 5.0).abs() < 1e-9);
         assert!(speeds.iter().all(|speed| (speed - 1.0).abs() < 1e-3), "{speeds:?}");
     }

@@ -99,31 +99,35 @@ impl<const N: usize> Network<'_, N> {
         delay: f64,
         dt: f64,
     ) -> (Fleet<N>, [f64; N]) {
-        self.run_delayed_with(fleet, seconds, delay, dt, |i, now, heard| match self.demand(law, i, now, heard) {
-            Demand::Rate(v_r) => v_r,
-            Demand::Acceleration(_) => panic!("the law does not give rates"),
-        })
+        run_delayed_with(fleet, seconds, delay, dt, |_, i, now, heard| self.v_r(law, i, now, heard))
     }
 
-    /// [`run_delayed`](Network::run_delayed) with any rule for v_r of vehicle `i` from the fleet now and as heard.
-    pub(super) fn run_delayed_with(
-        &self,
-        fleet: Fleet<N>,
-        seconds: f64,
-        delay: f64,
-        dt: f64,
-        v_r: impl Fn(usize, &Fleet<N>, &Fleet<N>) -> f64,
-    ) -> (Fleet<N>, [f64; N]) {
-        let late = (delay / dt).round() as usize;
-        let mut past = vec![fleet];
-        let mut rate = Fleet::at([0.0; N]);
-        for step in 0..(seconds / dt).round() as usize {
-            let (now, heard) = (&past[step], &past[step.saturating_sub(late)]);
-            rate.xi = std::array::from_fn(|i| v_r(i, now, heard));
-            past.push(now.moved(&rate, dt));
+    /// v_r of vehicle `i` by a law that gives rates.
+    pub(super) fn v_r(&self, law: &dyn CoordinationLaw, i: usize, now: &Fleet<N>, heard: &Fleet<N>) -> f64 {
+        match self.demand(law, i, now, heard) {
+            Demand::Rate(v_r) => v_r,
+            Demand::Acceleration(_) => panic!("the law does not give rates"),
         }
-        (past[past.len() - 1].clone(), rate.xi)
     }
+}
+
+/// [`Network::run_delayed`] with any rule for v_r from the time, the vehicle, and the fleet now and as heard.
+pub(super) fn run_delayed_with<const N: usize>(
+    fleet: Fleet<N>,
+    seconds: f64,
+    delay: f64,
+    dt: f64,
+    v_r: impl Fn(f64, usize, &Fleet<N>, &Fleet<N>) -> f64,
+) -> (Fleet<N>, [f64; N]) {
+    let late = (delay / dt).round() as usize;
+    let mut past = vec![fleet];
+    let mut rate = Fleet::at([0.0; N]);
+    for step in 0..(seconds / dt).round() as usize {
+        let (now, heard) = (&past[step], &past[step.saturating_sub(late)]);
+        rate.xi = std::array::from_fn(|i| v_r(step as f64 * dt, i, now, heard));
+        past.push(now.moved(&rate, dt));
+    }
+    (past[past.len() - 1].clone(), rate.xi)
 }
 
 /// The demands of vehicles at ξ and at ξ + `shift` are the same, and a vehicle ahead of all others is asked for less

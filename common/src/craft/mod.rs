@@ -1,5 +1,13 @@
 //! A craft is a vehicle with its path, its virtual target and its path-following law: everything of one vehicle
 //! that does not concern the others.
+//!
+//! | craft | plant | path-following law | takes | file |
+//! |---|---|---|---|---|
+//! | kinematic | kinematic unicycle | line of sight (1.4) | rate | [`kinematic`] |
+//! | robot | dynamic unicycle (3.12) | Proposition 3.1 | acceleration (3.39), or rate (4.21) | [`robot`] |
+
+pub mod kinematic;
+pub mod robot;
 
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 

@@ -346,6 +346,35 @@ mod tests {
     }
 
     #[test]
+    fn the_speed_follows_r_along_the_path() {
+        // v − R v_r decays as exp(−k₀ t) although R changes all the time; the held force leaves a part in a thousand.
+        let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
+        let mut craft = robot_with(path, SpeedLoop::Rate { k_0: 2.0 }, Gains::default(), 0.0, 0.0, 0.66);
+        let mut worst = 0f64;
+        for step in 0..6000 {
+            craft.command(REFERENCE, Demand::Rate(0.2));
+            craft.advance(0.005, 1);
+            if step > 2000 {
+                worst = worst.max((craft.observe().speed - 0.2 * craft.target.r()).abs());
+            }
+        }
+        assert!(worst < 2e-4, "{worst}");
+    }
+
+    #[test]
+    fn a_fleet_that_is_told_to_go_back_goes_back_along_the_path() {
+        let circle = Circle::new(Vector3::zeros(), 2.0, Turn::Left, 0.0, 1.0).unwrap();
+        let speed_loop = SpeedLoop::Rate { k_0: 2.0 };
+        let mut craft = robot_with(circle, speed_loop, Gains::default(), 2.4, 0.3, FRAC_PI_2);
+        for _ in 0..3000 {
+            craft.command(REFERENCE, Demand::Rate(-0.2));
+            craft.advance(0.02, 1);
+        }
+        let seen = craft.observe();
+        assert!(seen.e_norm < 1e-3 && seen.xi < -8.0 && (seen.speed + 0.4).abs() < 1e-6, "{seen:?}");
+    }
+
+    #[test]
     fn the_force_of_3_39_makes_eta_dot_equal_u() {
         // With R changing along the path and v_L changing in time.
         let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();

@@ -1,0 +1,72 @@
+//! One control period of each craft: coordination law, path-following law, and the plant integrated in two steps.
+//!
+//! The allocations that are counted must be none.
+
+use std::hint::black_box;
+use std::sync::Arc;
+
+use cpf_common::coordination::introduction_1_5::Introduction;
+use cpf_common::coordination::solution_1_3_43::SolutionOne;
+use cpf_common::coordination::switching_4_21::Switching;
+use cpf_common::coordination::{CoordinationLaw, Neighbour, SpeedReference};
+use cpf_common::craft::Craft;
+use cpf_common::craft::kinematic::KinematicCraft;
+use cpf_common::craft::robot::{RobotCraft, SpeedLoop};
+use cpf_common::following::line_of_sight::LineOfSight;
+use cpf_common::following::proposition_3_1::{Gains, Proposition31};
+use cpf_common::path::closest::closest_parameter;
+use cpf_common::path::line::Line;
+use cpf_common::path::sinusoid::Sinusoid;
+use cpf_common::vehicle::dynamic_unicycle::{Parameters, State};
+use nalgebra::Vector3;
+
+#[global_allocator]
+static ALLOCATIONS: divan::AllocProfiler = divan::AllocProfiler::system();
+
+const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
+const NEIGHBOURS: [Neighbour; 2] = [Neighbour { xi: 0.1, eta_over_r: 0.0 }, Neighbour { xi: -0.1, eta_over_r: 0.01 }];
+
+fn main() {
+    divan::main();
+}
+
+/// One control period of 20 ms.
+fn period(bencher: divan::Bencher, mut craft: impl Craft, law: impl CoordinationLaw) {
+    bencher.bench_local(|| {
+        let own = craft.own(REFERENCE);
+        craft.command(REFERENCE, law.demand(REFERENCE, &own, black_box(&NEIGHBOURS)));
+        craft.advance(0.02, 2);
+        black_box(craft.observe())
+    });
+}
+
+fn robot(speed_loop: SpeedLoop) -> RobotCraft {
+    let path = Sinusoid::new(1.0, 1.0, 4.0, 0.0, 0.0).expect("a path");
+    let law = Proposition31::new(Gains::default()).expect("gains");
+    let parameters = Parameters { mass: 5.0, inertia: 0.4 };
+    RobotCraft::new(Arc::new(path), law, speed_loop, parameters, State::default(), 0.0).expect("a robot")
+}
+
+#[divan::bench]
+fn kinematic_with_1_5(bencher: divan::Bencher) {
+    let path = Line::new(Vector3::zeros(), 0.3, 1.0).expect("a path");
+    let sight = LineOfSight::new(1.0).expect("a distance");
+    let craft = KinematicCraft::new(Arc::new(path), sight, 0.0, 1.0).expect("a craft");
+    period(bencher, craft, Introduction::new(0.2).expect("a gain"));
+}
+
+#[divan::bench]
+fn robot_with_3_43(bencher: divan::Bencher) {
+    period(bencher, robot(SpeedLoop::Acceleration), SolutionOne::new(1.0).expect("a gain"));
+}
+
+#[divan::bench]
+fn robot_with_4_21(bencher: divan::Bencher) {
+    period(bencher, robot(SpeedLoop::Rate { k_0: 2.0 }), Switching::new(0.1).expect("a gain"));
+}
+
+#[divan::bench]
+fn closest_point_of_a_sinusoid() -> f64 {
+    let path = Sinusoid::new(1.0, 1.0, 1.0, 0.0, 0.0).expect("a path");
+    closest_parameter(&path, black_box(Vector3::new(0.3, 0.2, 0.0)), true)
+}
