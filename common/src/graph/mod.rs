@@ -1,1 +1,6 @@
 //! Graphs, switching signals and what can be said of them.
+
+mod digraph;
+pub mod switching;
+
+pub use digraph::Graph;
