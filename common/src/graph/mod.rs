@@ -1,4 +1,6 @@
 //! Graphs, switching signals and what can be said of them.
-pub mod switching;
+
 mod digraph;
+pub mod switching;
+
 pub use digraph::Graph;
