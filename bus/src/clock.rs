@@ -58,12 +58,12 @@ impl RealClock {
             speed_up => (mission as f64 / speed_up).ceil() as i128,
         };
         let offset = wall - self.wall_at_anchor;
-        let length = Duration::from_nanos(u64::try_from(offset.unsigned_abs()).ok()?);
+        let length = u64::try_from(offset.unsigned_abs()).ok().map(Duration::from_nanos);
         if offset < 0 {
-            return Some(self.anchor.checked_sub(length).unwrap_or(self.anchor));
+            return Some(length.and_then(|length| self.anchor.checked_sub(length)).unwrap_or(self.anchor));
         }
         // One nanosecond more where floating point rounded to the early side: a wake-up may not find itself early.
-        let mut instant = self.anchor.checked_add(length).filter(|_| time != Time::MAX)?;
+        let mut instant = self.anchor.checked_add(length?).filter(|_| time != Time::MAX)?;
         while self.time_at(instant) < time {
             instant = instant.checked_add(rounding_step(mission))?;
         }
