@@ -1,0 +1,68 @@
+//! What passed on a line, and what did not.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// One end's count of a line's messages since the line was first opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// State-plane messages handed to the program.
+    pub state_in: u64,
+    /// Mission-plane messages handed to the program.
+    pub mission_in: u64,
+    /// State-plane messages given to the transport.
+    pub state_out: u64,
+    /// Mission-plane messages given to the transport or to the line's backlog.
+    pub mission_out: u64,
+    /// State-plane messages dropped because the program did not empty its queue.
+    pub state_dropped: u64,
+    /// Mission-plane messages dropped because the program did not empty its queue.
+    pub mission_dropped: u64,
+    /// Mission-plane messages refused because the other end takes nothing and the backlog is full.
+    pub backlogged: u64,
+    /// Frames that mean nothing, or interrupt a message.
+    pub garbage: u64,
+    /// State-plane messages longer than that plane carries.
+    pub oversized: u64,
+}
+
+/// [`Counts`] in the making.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) state_in: Counter,
+    pub(crate) mission_in: Counter,
+    pub(crate) state_out: Counter,
+    pub(crate) mission_out: Counter,
+    pub(crate) state_dropped: Counter,
+    pub(crate) mission_dropped: Counter,
+    pub(crate) backlogged: Counter,
+    pub(crate) garbage: Counter,
+    pub(crate) oversized: Counter,
+}
+
+impl Tally {
+    pub(crate) fn counts(&self) -> Counts {
+        Counts {
+            state_in: self.state_in.get(),
+            mission_in: self.mission_in.get(),
+            state_out: self.state_out.get(),
+            mission_out: self.mission_out.get(),
+            state_dropped: self.state_dropped.get(),
+            mission_dropped: self.mission_dropped.get(),
+            backlogged: self.backlogged.get(),
+            garbage: self.garbage.get(),
+            oversized: self.oversized.get(),
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Counter(AtomicU64);
+
+impl Counter {
+    pub(crate) fn add_one(&self) -> u64 {
+        self.0.fetch_add(1, Ordering::Relaxed) + 1
+    }
+    pub(crate) fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,418 @@
+//! The hub's end of the star: a lobby, and one line for each participant.
+//!
+//! A line is reused when its participant comes back, but its session is not: every admission opens a fresh session on a
+//! fresh port. What a frozen ghost of the participant still sends to the old port reaches nobody.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::Query;
+use zenoh::sample::SampleKind;
+use zenoh::{Session, Wait};
+
+use crate::counts::{Counts, Tally};
+use crate::error::{Error, Result};
+use crate::inbox::{Handshake, Inbox};
+use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
+use crate::outbox::Outbox;
+use crate::plane::{Frame, Plane, down_key, hub_token, join_key, participant_token, up_key};
+use crate::setup::{self, Endpoint, LEASE};
+
+/// How long [`Switchboard::close`] waits for participants to take what was sent to them.
+const FAREWELL: Duration = Duration::from_secs(1);
+/// Another process may take a port between its being found free and its being listened on.
+const PORT_TRIES: usize = 10;
+
+/// What a hub is opened with.
+#[derive(Clone, Debug)]
+pub struct SwitchboardConfig {
+    /// Where the lobby listens; lines listen on free ports of the same host. Port 0 lets the system choose.
+    pub endpoint: Endpoint,
+    /// The most participants, dead ones included.
+    pub max_lines: usize,
+    /// The most events that wait for the program; beyond, packets are dropped and counted.
+    pub queue: usize,
+}
+
+impl SwitchboardConfig {
+    /// 256 lines and 65 536 waiting events.
+    pub fn new(endpoint: Endpoint) -> SwitchboardConfig {
+        SwitchboardConfig { endpoint, max_lines: 256, queue: 1 << 16 }
+    }
+}
+
+/// The number of a line: 0 for the first participant that joined, and its own for as long as the hub lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LineId(u16);
+
+impl LineId {
+    /// The number, for indexing.
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl fmt::Display for LineId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}", self.0)
+    }
+}
+
+/// What happens on the hub's lines. A line's packets come after its `Joined` and before its `Left`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum HubEvent {
+    /// A participant holds its line, and can be sent to.
+    Joined {
+        /// Its line.
+        line: LineId,
+        /// Its identity.
+        id: String,
+    },
+    /// The participant closed its line, died, or was silent for too long.
+    Left {
+        /// Its line.
+        line: LineId,
+    },
+    /// A message has arrived.
+    Packet {
+        /// Whose it is.
+        line: LineId,
+        /// The plane it came on.
+        plane: Plane,
+        /// When it arrived, taken on the transport's thread.
+        at: Instant,
+        /// The message.
+        bytes: Vec<u8>,
+    },
+}
+
+/// The hub: all lines of the star end here.
+pub struct Switchboard {
+    endpoint: Endpoint,
+    lines: Arc<Lines>,
+    tasks: Sender<Task>,
+    clerk: Option<JoinHandle<()>>,
+}
+
+/// The lines, as the sending threads see them.
+#[derive(Default)]
+struct Lines(RwLock<Vec<Arc<HubLine>>>);
+
+struct HubLine {
+    id: String,
+    tally: Arc<Tally>,
+    /// The living session's way out, if there is one.
+    inbox: Mutex<Option<Arc<Inbox<HubEvent>>>>,
+}
+
+impl HubLine {
+    fn inbox(&self) -> Option<Arc<Inbox<HubEvent>>> {
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+    fn set_inbox(&self, inbox: Option<Arc<Inbox<HubEvent>>>) {
+        *self.inbox.lock().unwrap_or_else(PoisonError::into_inner) = inbox;
+    }
+}
+
+impl Lines {
+    fn get(&self, line: LineId) -> Option<Arc<HubLine>> {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).get(line.index()).cloned()
+    }
+    fn add(&self, line: HubLine) -> LineId {
+        let mut lines = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        lines.push(Arc::new(line));
+        LineId((lines.len() - 1) as u16)
+    }
+}
+
+impl Switchboard {
+    /// Opens the lobby.
+    pub fn open(config: SwitchboardConfig) -> Result<(Switchboard, Receiver<HubEvent>)> {
+        let endpoint = config.endpoint.free()?;
+        let lobby = setup::listen(&endpoint, setup::lobby_config(&endpoint)?)?;
+        let (events, receiver) = mpsc::sync_channel(config.queue.max(1));
+        let (tasks, queue) = mpsc::channel();
+        let lines = Arc::<Lines>::default();
+
+        let knocks = Mutex::new(tasks.clone());
+        lobby
+            .declare_queryable(join_key("*"))
+            .callback(move |query| {
+                let _ = knocks.lock().unwrap_or_else(PoisonError::into_inner).send(Task::Knock(query));
+            })
+            .background()
+            .wait()
+            .map_err(Error::middleware)?;
+
+        let mut clerk = Clerk {
+            endpoint: endpoint.clone(),
+            max_lines: config.max_lines.min(usize::from(u16::MAX)),
+            events,
+            tasks: tasks.clone(),
+            lines: Arc::clone(&lines),
+            by_id: HashMap::new(),
+            sessions: HashMap::new(),
+        };
+        let clerk = std::thread::Builder::new()
+            .name("bus-clerk".into())
+            .spawn(move || {
+                clerk.work(&queue);
+                setup::close(lobby);
+            })
+            .map_err(Error::middleware)?;
+        tracing::debug!("the lobby listens on {endpoint}");
+        Ok((Switchboard { endpoint, lines, tasks, clerk: Some(clerk) }, receiver))
+    }
+
+    /// Where the lobby listens.
+    pub fn endpoint(&self) -> &Endpoint {
+        &self.endpoint
+    }
+
+    /// Sends to one participant, from any thread, without ever waiting for it.
+    ///
+    /// On the state plane the message is dropped if the participant does not keep up. On the mission plane it waits in
+    /// the line's backlog; it is lost only with the line, which the hub then hears as [`HubEvent::Left`].
+    pub fn send(&self, line: LineId, plane: Plane, bytes: &[u8]) -> Result<()> {
+        let line = self.lines.get(line).ok_or(Error::NoSuchLine)?;
+        let inbox = line.inbox().filter(|inbox| inbox.is_open()).ok_or(Error::NotConnected)?;
+        inbox.outbox.send(plane, bytes)
+    }
+
+    /// The identity of a line's participant.
+    pub fn id(&self, line: LineId) -> Option<String> {
+        self.lines.get(line).map(|line| line.id.clone())
+    }
+
+    /// What has passed on a line so far, over all of its sessions.
+    pub fn counts(&self, line: LineId) -> Option<Counts> {
+        self.lines.get(line).map(|line| line.tally.counts())
+    }
+
+    /// Lets participants take what was sent to them (for a second at most), then closes every line and the lobby.
+    pub fn close(self) {
+        // Dropping does it.
+    }
+
+    fn shut(&mut self) {
+        let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let deadline = Instant::now() + FAREWELL;
+        for inbox in lines.iter().filter_map(|line| line.inbox()).filter(|inbox| inbox.is_open()) {
+            inbox.outbox.drain(deadline);
+        }
+        let (done, closed) = mpsc::channel();
+        let _ = self.tasks.send(Task::Close(done));
+        // The clerk may be stuck announcing something to a program that no longer listens.
+        if closed.recv_timeout(Duration::from_secs(5)).is_ok()
+            && let Some(clerk) = self.clerk.take()
+        {
+            let _ = clerk.join();
+        }
+    }
+}
+
+impl Drop for Switchboard {
+    fn drop(&mut self) {
+        self.shut();
+    }
+}
+
+impl fmt::Debug for Switchboard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Switchboard").field("endpoint", &self.endpoint).finish_non_exhaustive()
+    }
+}
+
+/// What the clerk is asked to do.
+enum Task {
+    /// Somebody asks to be let in.
+    Knock(Query),
+    /// The participant with this nonce is gone from its line.
+    Gone { line: LineId, nonce: u64 },
+    /// The end.
+    Close(Sender<()>),
+}
+
+/// Opens and closes lines, on a thread of its own: opening a session takes milliseconds.
+struct Clerk {
+    endpoint: Endpoint,
+    max_lines: usize,
+    events: SyncSender<HubEvent>,
+    tasks: Sender<Task>,
+    lines: Arc<Lines>,
+    by_id: HashMap<String, LineId>,
+    sessions: HashMap<LineId, LineSession>,
+}
+
+/// One admission: the session behind a port.
+struct LineSession {
+    nonce: u64,
+    opened: Instant,
+    session: Session,
+    inbox: Arc<Inbox<HubEvent>>,
+    _hub_token: LivelinessToken,
+}
+
+impl Clerk {
+    fn work(&mut self, queue: &Receiver<Task>) {
+        while let Ok(task) = queue.recv() {
+            match task {
+                Task::Knock(query) => self.answer(&query),
+                Task::Gone { line, nonce } => {
+                    if self.sessions.get(&line).is_some_and(|session| session.nonce == nonce) {
+                        self.retire(line);
+                    }
+                }
+                Task::Close(done) => {
+                    // Everybody's peers learn it at once, and one that is slow to close holds up none of the others.
+                    let lines: Vec<LineId> = self.sessions.keys().copied().collect();
+                    std::thread::scope(|scope| {
+                        for line in lines {
+                            let Some((session, was_open)) = self.unplug(line) else { continue };
+                            if was_open {
+                                // The program may listen no more: it hears of the end if its queue has room.
+                                let _ = self.events.try_send(HubEvent::Left { line });
+                            }
+                            scope.spawn(move || setup::close(session));
+                        }
+                    });
+                    let _ = done.send(());
+                    return;
+                }
+            }
+        }
+    }
+
+    fn answer(&mut self, query: &Query) {
+        let key = query.key_expr().as_str();
+        let id = key.rsplit('/').next().unwrap_or(key);
+        let replied = match self.admit(id, query.parameters().as_str()) {
+            Ok(Ok(admission)) => query.reply(query.key_expr().clone(), admission.encode()).wait(),
+            Ok(Err(refusal)) => {
+                tracing::info!("refused: {refusal}");
+                query.reply_err(refusal.encode()).wait()
+            }
+            Err(error) => {
+                tracing::error!("no line for {id}: {error}");
+                query.reply_err(error.to_string()).wait()
+            }
+        };
+        if let Err(error) = replied {
+            tracing::debug!("{id} did not wait for its answer: {error}");
+        }
+    }
+
+    fn admit(&mut self, id: &str, request: &str) -> Result<std::result::Result<Admission, Refusal>> {
+        if let Err(refusal) = check_id(id) {
+            return Ok(Err(refusal));
+        }
+        let request = Request::decode(request).unwrap_or(Request { version: 0, nonce: 0 });
+        if request.version != PROTOCOL_VERSION {
+            return Ok(Err(Refusal::Version { hub: PROTOCOL_VERSION, participant: request.version }));
+        }
+        let line = match self.by_id.get(id) {
+            Some(&line) => line,
+            None if self.by_id.len() >= self.max_lines => return Ok(Err(Refusal::Full { lines: self.max_lines })),
+            None => {
+                let line = self.lines.add(HubLine { id: id.into(), tally: Arc::default(), inbox: Mutex::default() });
+                self.by_id.insert(id.into(), line);
+                line
+            }
+        };
+        if let Some(session) = self.sessions.get(&line) {
+            // A participant that asks again has lost its session. One that was admitted a moment ago is on its way.
+            let alive = session.inbox.is_open() || session.opened.elapsed() < LEASE;
+            if session.nonce != request.nonce && alive {
+                return Ok(Err(Refusal::Taken { id: id.into() }));
+            }
+            self.retire(line);
+        }
+        let (session, port) = self.open_line(line, id, request.nonce)?;
+        self.sessions.insert(line, session);
+        Ok(Ok(Admission { port }))
+    }
+
+    /// Ends a line's session; its participant may come back.
+    fn retire(&mut self, line: LineId) {
+        if let Some((session, was_open)) = self.unplug(line) {
+            if was_open {
+                let _ = self.events.send(HubEvent::Left { line });
+            }
+            let _ = std::thread::Builder::new().name("bus-retire".into()).spawn(|| setup::close(session));
+        }
+    }
+
+    /// Takes a line's session out of service; true if its participant had joined.
+    fn unplug(&mut self, line: LineId) -> Option<(Session, bool)> {
+        let LineSession { session, inbox, .. } = self.sessions.remove(&line)?;
+        if let Some(line) = self.lines.get(line) {
+            line.set_inbox(None);
+        }
+        Some((session, inbox.close()))
+    }
+
+    fn open_line(&self, line: LineId, id: &str, nonce: u64) -> Result<(LineSession, u16)> {
+        let mut tries = 0;
+        let (endpoint, session) = loop {
+            let endpoint = self.endpoint.with_port(0).free()?;
+            match setup::listen(&endpoint, setup::line_config(&endpoint, id, nonce)?) {
+                Ok(session) => break (endpoint, session),
+                Err(Error::PortInUse(_)) if tries < PORT_TRIES => tries += 1,
+                Err(error) => return Err(error),
+            }
+        };
+        let hub_line = self.lines.get(line).ok_or(Error::NoSuchLine)?;
+        let tally = Arc::clone(&hub_line.tally);
+        let outbox = Outbox::new(&session, |plane| down_key(id, plane), Arc::clone(&tally))?;
+        let inbox = Arc::new(Inbox::new(self.events.clone(), outbox, tally, move |plane, at, bytes| {
+            HubEvent::Packet { line, plane, at, bytes }
+        }));
+
+        let up = Arc::clone(&inbox);
+        session
+            .declare_subscriber(up_key(id, Plane::State))
+            .callback(move |sample| up.on_state(&sample.payload().to_bytes()))
+            .background()
+            .wait()
+            .map_err(Error::middleware)?;
+
+        let up = Arc::clone(&inbox);
+        let name = id.to_owned();
+        session
+            .declare_subscriber(up_key(id, Plane::Mission))
+            .callback(move |sample| {
+                if let Some(Handshake::Hello(hello)) = up.on_mission(&sample.payload().to_bytes())
+                    && hello == nonce
+                {
+                    // The program can send only after the welcome: the welcome is the first thing that goes down.
+                    let welcome = || _ = up.outbox.send_frame(&Frame::Welcome { nonce });
+                    up.open(HubEvent::Joined { line, id: name.clone() }, welcome);
+                }
+            })
+            .background()
+            .wait()
+            .map_err(Error::middleware)?;
+
+        let tasks = Mutex::new(self.tasks.clone());
+        session
+            .liveliness()
+            .declare_subscriber(participant_token(id, nonce))
+            .callback(move |sign| {
+                if sign.kind() == SampleKind::Delete {
+                    let _ = tasks.lock().unwrap_or_else(PoisonError::into_inner).send(Task::Gone { line, nonce });
+                }
+            })
+            .background()
+            .wait()
+            .map_err(Error::middleware)?;
+        let token = session.liveliness().declare_token(hub_token(id)).wait().map_err(Error::middleware)?;
+
+        hub_line.set_inbox(Some(Arc::clone(&inbox)));
+        Ok((LineSession { nonce, opened: Instant::now(), session, inbox, _hub_token: token }, endpoint.port()))
+    }
+}

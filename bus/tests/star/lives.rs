@@ -1,0 +1,193 @@
+//! Duplicates, deaths, freezes and returns.
+
+use std::net::TcpListener;
+use std::time::{Duration, Instant};
+
+use bus::clock::{Wake, recv_until};
+use bus::line::{Line, LineConfig, LineEvent};
+use bus::setup::Endpoint;
+use bus::switchboard::{HubEvent, Switchboard, SwitchboardConfig};
+use bus::{Error, Plane, Refusal};
+use rustix::process::Signal;
+
+use crate::support::*;
+
+#[test]
+#[ignore = "a role: a participant that sends back what it gets"]
+fn echoing_participant() {
+    let (line, events) = line(&role_endpoint(), "auv1");
+    while let Ok(event) = events.recv() {
+        if let LineEvent::Packet { plane, bytes, .. } = event {
+            let _ = line.send(plane, &bytes);
+        }
+    }
+}
+
+#[test]
+#[ignore = "a role: a hub that sends back what it gets"]
+fn echoing_hub() {
+    let (hub, events) = Switchboard::open(SwitchboardConfig::new(role_endpoint())).expect("the hub opens");
+    while let Ok(event) = events.recv() {
+        if let HubEvent::Packet { line, plane, bytes, .. } = event {
+            let _ = hub.send(line, plane, &bytes);
+        }
+    }
+}
+
+#[test]
+fn a_living_participant_keeps_its_identity_for_itself() {
+    let (hub, hub_events) = hub();
+    let (first, first_events, number) = joined(&hub, &hub_events, "auv1");
+    let mut config = LineConfig::new(hub.endpoint().clone(), "auv1");
+    config.patience = Some(PATIENCE);
+    let error = Line::connect(config.clone()).expect_err("the identity is taken");
+    assert_eq!(error, Error::Refused(Refusal::Taken { id: "auv1".into() }));
+    assert_eq!(error.to_string(), "auv1 is already connected");
+
+    hub.send(number, Plane::Mission, b"undisturbed").expect("joined");
+    assert_eq!(expect_down(&first_events), (Plane::Mission, b"undisturbed".to_vec()));
+    first.close();
+    assert_eq!(next(&hub_events), HubEvent::Left { line: number });
+    let (_second, _events, again) = joined(&hub, &hub_events, "auv1");
+    assert_eq!(again, number);
+}
+
+#[test]
+fn the_hub_says_why_it_lets_somebody_not_in() {
+    let mut config = SwitchboardConfig::new(any_port());
+    config.max_lines = 1;
+    let (hub, hub_events) = Switchboard::open(config).expect("the hub opens");
+    let (_auv, _events, _) = joined(&hub, &hub_events, "auv1");
+    let connect =
+        |id: &str| Line::connect(LineConfig::new(hub.endpoint().clone(), id)).expect_err("refused").to_string();
+    assert!(connect("AUV 2").contains("`AUV 2` cannot be an identity"));
+    assert_eq!(connect("auv2"), "all 1 lines of the network-emulator are taken");
+
+    // The hub does not trust participants to have checked.
+    let lobby = plain_client(hub.endpoint().port());
+    assert_eq!(ask_for_line(&lobby, "AUV2", 1), Err("id: AUV2".into()));
+    let replies = zenoh::Wait::wait(lobby.get("cpf/join/auv1?version=9;nonce=1")).expect("asking succeeds");
+    let refusal = replies.recv().expect("an answer").into_result().expect_err("refused");
+    assert_eq!(refusal.payload().try_to_string().expect("text"), "version: 1 9");
+}
+
+#[test]
+fn a_killed_participant_leaves_and_its_successor_gets_the_same_line() {
+    let (hub, hub_events) = hub();
+    let mut lines = Vec::new();
+    for life in 0..3u8 {
+        let actor = Actor::start("lives::echoing_participant", hub.endpoint());
+        let number = expect_joined(&hub_events, "auv1");
+        hub.send(number, Plane::Mission, &[life]).expect("joined");
+        assert_eq!(expect_up(&hub_events, number), (Plane::Mission, vec![life]));
+        actor.kill();
+        assert_eq!(next(&hub_events), HubEvent::Left { line: number });
+        assert_eq!(hub.send(number, Plane::Mission, b"to the dead"), Err(Error::NotConnected));
+        lines.push(number);
+    }
+    assert!(lines.iter().all(|line| *line == lines[0]), "{lines:?}");
+}
+
+#[test]
+fn a_line_outlives_its_hub() {
+    let endpoint = free_endpoint();
+    let mut actor = Actor::start("lives::echoing_hub", &endpoint);
+    let (line, events) = line(&endpoint, "auv1");
+    for life in 0..2u8 {
+        for plane in [Plane::State, Plane::Mission] {
+            line.send(plane, &[life]).expect("connected");
+            assert_eq!(expect_down(&events), (plane, vec![life]));
+        }
+        actor.kill();
+        assert_eq!(next(&events), LineEvent::Lost);
+        assert_eq!(line.send(Plane::Mission, b"to nobody"), Err(Error::NotConnected));
+        actor = Actor::start("lives::echoing_hub", &endpoint);
+        assert_eq!(next(&events), LineEvent::Connected);
+    }
+    line.send(Plane::Mission, b"again").expect("who hears Connected may send at once");
+    assert_eq!(expect_down(&events), (Plane::Mission, b"again".to_vec()));
+}
+
+#[test]
+fn a_hub_that_closes_says_good_bye_after_its_last_word() {
+    let (hub, hub_events) = hub();
+    let (line, events, number) = joined(&hub, &hub_events, "auv1");
+    let last_word = vec![7; 3 << 20];
+    hub.send(number, Plane::Mission, &last_word).expect("joined");
+    hub.close();
+    assert!(expect_down(&events) == (Plane::Mission, last_word));
+    assert_eq!(next(&events), LineEvent::Lost);
+    assert_eq!(next(&hub_events), HubEvent::Left { line: number });
+    assert_eq!(recv_until(&hub_events, Some(Instant::now() + PATIENCE)), Wake::Closed);
+    drop(line);
+}
+
+/// If a send to the frozen one waited for it, the hub would be held up until it is held for dead, and its `Left` would
+/// come before the living one's answers.
+#[test]
+fn a_frozen_participant_holds_up_nobody_and_comes_back() {
+    let (hub, hub_events) = hub();
+    let actor = Actor::start("lives::echoing_participant", hub.endpoint());
+    let frozen = expect_joined(&hub_events, "auv1");
+    let (living, living_events, number) = joined(&hub, &hub_events, "auv2");
+    actor.signal(Signal::STOP);
+
+    for i in 0..40u8 {
+        for _ in 0..50 {
+            hub.send(frozen, Plane::State, &[i; 8 << 10]).expect("joined");
+        }
+        hub.send(frozen, Plane::Mission, &vec![i; 1 << 20]).expect("joined");
+        for plane in [Plane::State, Plane::Mission] {
+            hub.send(number, plane, &[i]).expect("joined");
+            assert_eq!(expect_down(&living_events), (plane, vec![i]));
+            living.send(plane, &[i]).expect("connected");
+            assert_eq!(expect_up(&hub_events, number), (plane, vec![i]));
+        }
+    }
+    let mut refused = 0;
+    while refused == 0 {
+        match hub.send(frozen, Plane::Mission, &[0; 4 << 20]) {
+            Ok(()) => {}
+            Err(Error::Backlogged) => refused += 1,
+            Err(other) => panic!("{other}"),
+        }
+    }
+    assert_eq!(hub.counts(frozen).expect("known").backlogged, 1);
+    assert_eq!(next(&hub_events), HubEvent::Left { line: frozen }, "the lease has ended");
+
+    actor.signal(Signal::CONT);
+    let back = loop {
+        match next(&hub_events) {
+            HubEvent::Joined { line, .. } => break line,
+            HubEvent::Packet { .. } => panic!("a ghost's message was heard"),
+            HubEvent::Left { .. } => panic!("it had left"),
+        }
+    };
+    assert_eq!(back, frozen);
+    hub.send(frozen, Plane::Mission, b"welcome back").expect("joined");
+    assert_eq!(expect_up(&hub_events, frozen), (Plane::Mission, b"welcome back".to_vec()));
+}
+
+#[test]
+fn a_port_in_use_is_one_clear_error() {
+    let holder = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let endpoint = Endpoint::local().with_port(holder.local_addr().expect("bound").port());
+    let error = Switchboard::open(SwitchboardConfig::new(endpoint.clone())).expect_err("in use");
+    assert_eq!(error, Error::PortInUse(endpoint.clone()));
+    assert!(error.to_string().contains(&format!("{endpoint} is already in use")), "{error}");
+    let (hub, _events) = hub();
+    let second = Switchboard::open(SwitchboardConfig::new(hub.endpoint().clone())).expect_err("in use");
+    assert_eq!(second, Error::PortInUse(hub.endpoint().clone()));
+}
+
+#[test]
+fn patience_ends_where_there_is_no_hub() {
+    let endpoint = free_endpoint();
+    let mut config = LineConfig::new(endpoint.clone(), "auv1");
+    config.patience = Some(Duration::from_millis(300));
+    let begun = Instant::now();
+    let error = Line::connect(config).expect_err("nobody is there");
+    assert!(begun.elapsed() >= Duration::from_millis(300));
+    assert!(error.to_string().contains(&endpoint.to_string()), "{error}");
+    assert!(matches!(error, Error::NoHub { .. }));
+}
