@@ -28,7 +28,7 @@ mod recorder;
 mod topic;
 
 pub use merge::{CanonicalRecorder, Merged, Recovered, merge, recover};
-pub use order::canonical_order;
+pub use order::{canonical_order, canonical_order_of_records};
 pub use read::{Recording, RowReader, read, read_from};
 pub use recorder::{FLUSH_PERIOD, Recorder};
 pub use topic::topic_of;
