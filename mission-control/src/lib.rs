@@ -1,4 +1,3 @@
-//! Mission control: checks, simulates, runs, watches, collects and reports flights.
+//! Placeholder.
 
-pub mod conduct;
-pub mod simulate;
+pub mod results;

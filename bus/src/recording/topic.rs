@@ -1,0 +1,153 @@
+//! Topics and their schemas.
+
+use std::borrow::Cow;
+
+use common::record::{
+    AchievedRow, ClockRecord, MessageRow, NoteRow, Record, Row, SpeedRow, StateRow, TicksRow, TopologyRow,
+};
+use schemars::generate::SchemaSettings;
+
+/// The kind of a topic; the discriminant is its rank in the canonical order. Exact topics rank before clock topics,
+/// and within one instant the order is that of a tick: command, network, vehicles, messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Topic {
+    Speed,
+    Topology,
+    State,
+    Message,
+    Achieved,
+    Ticks,
+    Note,
+}
+
+const STATE_PREFIX: &str = "/vehicles/";
+const STATE_SUFFIX: &str = "/state";
+
+impl Topic {
+    pub(super) const COUNT: usize = 7;
+
+    pub(super) fn of(row: &Row) -> Topic {
+        match row {
+            Row::Exact(Record::Speed(_)) => Topic::Speed,
+            Row::Exact(Record::Topology(_)) => Topic::Topology,
+            Row::Exact(Record::State(_)) => Topic::State,
+            Row::Exact(Record::Message(_)) => Topic::Message,
+            Row::Clock(ClockRecord::Achieved(_)) => Topic::Achieved,
+            Row::Clock(ClockRecord::Ticks(_)) => Topic::Ticks,
+            Row::Clock(ClockRecord::Note(_)) => Topic::Note,
+        }
+    }
+
+    /// The full name of the topic; `vehicle` is used by states only.
+    pub(super) fn name(self, vehicle: &str) -> Cow<'static, str> {
+        match self {
+            Topic::Speed => "/mission/speed".into(),
+            Topic::Topology => "/network/topology".into(),
+            Topic::State => format!("{STATE_PREFIX}{vehicle}{STATE_SUFFIX}").into(),
+            Topic::Message => "/network/messages".into(),
+            Topic::Achieved => "/clock/achieved".into(),
+            Topic::Ticks => "/clock/ticks".into(),
+            Topic::Note => "/clock/notes".into(),
+        }
+    }
+
+    /// The topic of that name; `None` if it is not one of ours.
+    pub(super) fn named(name: &str) -> Option<Topic> {
+        match name {
+            "/mission/speed" => Some(Topic::Speed),
+            "/network/topology" => Some(Topic::Topology),
+            "/network/messages" => Some(Topic::Message),
+            "/clock/achieved" => Some(Topic::Achieved),
+            "/clock/ticks" => Some(Topic::Ticks),
+            "/clock/notes" => Some(Topic::Note),
+            _ => name.strip_prefix(STATE_PREFIX)?.strip_suffix(STATE_SUFFIX).map(|_| Topic::State),
+        }
+    }
+
+    /// The name and the JSON schema of the rows.
+    pub(super) fn schema(self) -> (&'static str, Vec<u8>) {
+        // Definitions are inlined: most viewers do not follow references.
+        let generator = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true).into_generator();
+        let (name, schema) = match self {
+            Topic::Speed => ("cpf.Speed", generator.into_root_schema_for::<SpeedRow>()),
+            Topic::Topology => ("cpf.Topology", generator.into_root_schema_for::<TopologyRow>()),
+            Topic::State => ("cpf.State", generator.into_root_schema_for::<StateRow>()),
+            Topic::Message => ("cpf.Message", generator.into_root_schema_for::<MessageRow>()),
+            Topic::Achieved => ("cpf.Achieved", generator.into_root_schema_for::<AchievedRow>()),
+            Topic::Ticks => ("cpf.Ticks", generator.into_root_schema_for::<TicksRow>()),
+            Topic::Note => ("cpf.Note", generator.into_root_schema_for::<NoteRow>()),
+        };
+        (name, schema.as_value().to_string().into_bytes())
+    }
+
+    /// The row in a message of this topic.
+    pub(super) fn decode(self, json: &[u8]) -> serde_json::Result<Row> {
+        Ok(match self {
+            Topic::Speed => Row::Exact(Record::Speed(serde_json::from_slice(json)?)),
+            Topic::Topology => Row::Exact(Record::Topology(serde_json::from_slice(json)?)),
+            Topic::State => Row::Exact(Record::State(serde_json::from_slice(json)?)),
+            Topic::Message => Row::Exact(Record::Message(serde_json::from_slice(json)?)),
+            Topic::Achieved => Row::Clock(ClockRecord::Achieved(serde_json::from_slice(json)?)),
+            Topic::Ticks => Row::Clock(ClockRecord::Ticks(serde_json::from_slice(json)?)),
+            Topic::Note => Row::Clock(ClockRecord::Note(serde_json::from_slice(json)?)),
+        })
+    }
+
+    /// Appends the row as JSON.
+    pub(super) fn encode(row: &Row, json: &mut Vec<u8>) -> serde_json::Result<()> {
+        match row {
+            Row::Exact(Record::Speed(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::Topology(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::State(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::Message(row)) => serde_json::to_writer(json, row),
+            Row::Clock(ClockRecord::Achieved(row)) => serde_json::to_writer(json, row),
+            Row::Clock(ClockRecord::Ticks(row)) => serde_json::to_writer(json, row),
+            Row::Clock(ClockRecord::Note(row)) => serde_json::to_writer(json, row),
+        }
+    }
+}
+
+/// The topic on which a row is recorded.
+pub fn topic_of(row: &Row) -> Cow<'static, str> {
+    let vehicle = match row {
+        Row::Exact(Record::State(state)) => state.vehicle.as_str(),
+        _ => "",
+    };
+    Topic::of(row).name(vehicle)
+}
+
+/// When the row was written, in mission time \[ns\].
+pub(super) fn time_of(row: &Row) -> i64 {
+    match row {
+        Row::Exact(record) => record.t_ns(),
+        Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
+        Row::Clock(ClockRecord::Ticks(row)) => row.t_ns,
+        Row::Clock(ClockRecord::Note(row)) => row.t_ns,
+    }
+}
+
+/// Whether every number in the row can be written as JSON.
+pub(super) fn is_finite(row: &Row) -> bool {
+    match row {
+        Row::Exact(Record::State(s)) => [
+            s.xi,
+            s.xi_rate,
+            s.v_ref,
+            s.x_m,
+            s.y_m,
+            s.z_m,
+            s.yaw_rad,
+            s.pitch_rad,
+            s.roll_rad,
+            s.speed_mps,
+            s.e_along_m,
+            s.e_cross_m,
+            s.e_norm_m,
+            s.psi_e_rad,
+        ]
+        .iter()
+        .all(|value| value.is_finite()),
+        Row::Exact(Record::Speed(row)) => row.speed.is_finite(),
+        _ => true,
+    }
+}

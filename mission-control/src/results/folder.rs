@@ -1,0 +1,5 @@
+//! stub
+/// a
+pub struct Account;
+/// x
+pub fn write_run_folder() {}

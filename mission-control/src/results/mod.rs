@@ -1,0 +1,37 @@
+//! Everything that happens to the rows of a run.
+//!
+//! | part | what it gives |
+//! |---|---|
+//! | [`summarise`], [`summarise_clock`] | `summary.json` (a function of mission and seed), `clock.json` (of the machine) |
+//! | [`figures()`] | SVG figures in the arrangement of the thesis |
+//! | [`report()`] | `report.html`, one self-contained file |
+//! | [`write_run_folder`] | all of these into a run folder, each file whole or not at all |
+//! | [`export_csv`] | `vehicles.csv`, `links.csv`, `topology.csv` |
+//! | [`diff()`] | *equal*, or the first row in which two runs part |
+
+mod diff;
+mod export;
+mod facts;
+mod figures;
+mod folder;
+mod network;
+mod report;
+mod series;
+mod statistics;
+mod summary;
+#[cfg(test)]
+mod testing;
+
+pub use diff::{Outcome, Side, diff, origins_differ};
+pub use export::{Exporter, export_csv};
+pub use facts::{Facts, VehicleFacts};
+pub use figures::{Figure, figures};
+pub use folder::{Account, write_run_folder};
+pub use network::{Connectivity, LinkSummary, Network, Spread};
+pub use report::{Report, TheoryRow, report};
+pub use series::{Coordination, Track, tracks};
+pub use statistics::{ExponentialFit, fit_exponential, settling_time};
+pub use summary::{
+    ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
+    Summary, VehicleSummary, summarise, summarise_clock,
+};

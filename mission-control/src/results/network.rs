@@ -1,0 +1,445 @@
+//! What became of the messages, and when the links were up.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use common::record::{Fate, MessageRow, Record};
+use serde::Serialize;
+
+use super::Facts;
+use super::statistics::{largest, quantile, sorted};
+
+/// The messages of one directed link.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LinkSummary {
+    /// The sender.
+    pub from: String,
+    /// The receiver.
+    pub to: String,
+    /// Messages that the emulator took for this link.
+    pub sent: u64,
+    /// Handed to the receiver.
+    pub delivered: u64,
+    /// Lost by the loss model.
+    pub lost: u64,
+    /// Dropped because the link was down.
+    pub link_down: u64,
+    /// Dropped because the queue was full.
+    pub queue_full: u64,
+    /// Under way when the mission ended.
+    pub in_flight: u64,
+    /// Sequence numbers between the first and the last of a sender's life that have no row.
+    pub missing: u64,
+    /// Messages with more than one row.
+    pub repeated: u64,
+    /// Whether every message has one fate: sent = delivered + dropped + in flight, none missing, none repeated.
+    pub balanced: bool,
+    /// Size of what was delivered \[bytes\].
+    pub delivered_bytes: u64,
+    /// Commanded delay of what was delivered \[s\].
+    pub delay: Option<Spread>,
+    /// Part of the time that the link was up.
+    pub up_fraction: f64,
+    /// The longest time that it was down \[s\].
+    pub longest_outage_s: f64,
+}
+
+/// Median, 99th percentile and maximum.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Half of the values are at or below this.
+    pub median: f64,
+    /// 99 % of the values are at or below this.
+    pub p99: f64,
+    /// The largest value.
+    pub max: f64,
+}
+
+impl Spread {
+    /// The spread of some values; `None` if there are none.
+    pub(super) fn of(values: &[f64]) -> Option<Spread> {
+        let ascending = sorted(values);
+        let max = *ascending.last()?;
+        Some(Spread { median: quantile(&ascending, 0.5)?, p99: quantile(&ascending, 0.99)?, max })
+    }
+}
+
+/// Every directed link's messages and up times: the links of the mission first, then others that have rows.
+pub fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<LinkSummary> {
+    let mut messages: BTreeMap<(&str, &str), Vec<&MessageRow>> = BTreeMap::new();
+    for record in exact {
+        if let Record::Message(row) = record {
+            messages.entry((&row.from, &row.to)).or_default().push(row);
+        }
+    }
+    let named: Vec<(&str, &str)> = facts.links.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect();
+    let others = messages.keys().copied().filter(|link| !named.contains(link)).collect::<Vec<_>>();
+    let all = named.into_iter().chain(others);
+    all.map(|(from, to)| {
+        let rows = messages.get(&(from, to)).map_or(&[][..], Vec::as_slice);
+        let summary = ledger(rows, facts.message_bytes);
+        let down = network.down_times(from, to);
+        let duration = network.end_s - network.start_s;
+        let down_s: f64 = down.iter().map(|(from, to)| to - from).sum();
+        LinkSummary {
+            from: from.to_owned(),
+            to: to.to_owned(),
+            up_fraction: if duration > 0.0 { 1.0 - down_s / duration } else { 1.0 },
+            longest_outage_s: largest(down.iter().map(|(from, to)| to - from)),
+            ..summary
+        }
+    })
+    .collect()
+}
+
+fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
+    let count = |fate| rows.iter().filter(|row| row.fate == fate).count() as u64;
+    let mut in_order: Vec<(i64, u64)> = rows.iter().map(|row| (row.sent_ns, row.seq)).collect();
+    in_order.sort_unstable();
+    let (mut missing, mut repeated) = (0, 0);
+    for pair in in_order.windows(2) {
+        if pair[0] == pair[1] {
+            repeated += 1;
+        } else if pair[1].1 > pair[0].1 {
+            // A number that does not rise begins a new life of the sender.
+            missing += pair[1].1 - pair[0].1 - 1;
+        }
+    }
+    let delays =
+        rows.iter().filter(|row| row.fate == Fate::Delivered).map(|row| (row.due_ns - row.sent_ns) as f64 / 1e9);
+    let delivered = count(Fate::Delivered);
+    let summary = LinkSummary {
+        sent: rows.len() as u64 - repeated,
+        delivered,
+        lost: count(Fate::Lost),
+        link_down: count(Fate::LinkDown),
+        queue_full: count(Fate::QueueFull),
+        in_flight: count(Fate::InFlight),
+        missing,
+        repeated,
+        delivered_bytes: delivered * message_bytes,
+        delay: Spread::of(&delays.collect::<Vec<_>>()),
+        ..LinkSummary::default()
+    };
+    let accounted = summary.delivered + summary.lost + summary.link_down + summary.queue_full + summary.in_flight;
+    LinkSummary { balanced: summary.sent == accounted && missing == 0 && repeated == 0, ..summary }
+}
+
+/// Number of transmissions: a message to several receivers goes on the air once.
+pub fn transmissions(exact: &[Record]) -> u64 {
+    let mut sent: Vec<(&str, i64, u64)> = exact
+        .iter()
+        .filter_map(|record| match record {
+            Record::Message(row) => Some((row.from.as_str(), row.sent_ns, row.seq)),
+            _ => None,
+        })
+        .collect();
+    sent.sort_unstable();
+    sent.dedup();
+    sent.len() as u64
+}
+
+/// The links over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Network {
+    /// Start of the observation \[s\].
+    pub start_s: f64,
+    /// Its end \[s\].
+    pub end_s: f64,
+    /// Instants of changes \[s\] for each link, with the new state.
+    changes: BTreeMap<(String, String), Vec<(f64, bool)>>,
+}
+
+/// Connectivity over time, measured as the theory of chapter 4 wants it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Connectivity {
+    /// α, the part of the time in which no vehicle could be heard, over however many hops, by all others.
+    pub alpha: f64,
+    /// The smallest T_0 \[s\] with which the losses are brief: time lost in \[τ, t\] ≤ α(t − τ) + (1 − α)T_0 (4.11);
+    /// `None` if α = 1.
+    pub t_0_s: Option<f64>,
+    /// The smallest T \[s\] such that the union of the graph over every interval of length T is connected in that
+    /// sense; `None` if the end of the run was reached without.
+    pub t_s: Option<f64>,
+}
+
+impl Network {
+    /// The links over \[0, `duration`\]. A link whose first change is to go down was up before, and a link of which
+    /// nothing is said was up all the time.
+    pub fn of(exact: &[Record], facts: &Facts) -> Network {
+        let mut changes: BTreeMap<(String, String), Vec<(f64, bool)>> = BTreeMap::new();
+        for link in &facts.links {
+            changes.entry(link.clone()).or_default();
+        }
+        for record in exact {
+            if let Record::Topology(row) = record {
+                let at = (row.t_ns as f64 / 1e9).clamp(0.0, facts.duration_s);
+                changes.entry((row.from.clone(), row.to.clone())).or_default().push((at, row.up));
+            }
+        }
+        changes.values_mut().for_each(|changes| changes.sort_by(|a, b| a.0.total_cmp(&b.0)));
+        Network { start_s: 0.0, end_s: facts.duration_s, changes }
+    }
+
+    /// When a link was down, as intervals (from, to) \[s\].
+    pub fn down_times(&self, from: &str, to: &str) -> Vec<(f64, f64)> {
+        let changes = self.changes.get(&(from.to_owned(), to.to_owned())).map_or(&[][..], Vec::as_slice);
+        let mut since = changes.first().filter(|first| first.1).map(|_| self.start_s);
+        let mut down = Vec::new();
+        for (at, up) in changes {
+            match (since, up) {
+                (Some(start), true) => {
+                    down.push((start, *at));
+                    since = None;
+                }
+                (None, false) => since = Some(*at),
+                _ => {}
+            }
+        }
+        down.extend(since.map(|start| (start, self.end_s)));
+        down.retain(|(from, to)| to > from);
+        down
+    }
+
+    /// When every link was down, as intervals \[s\].
+    pub fn blackouts(&self) -> Vec<(f64, f64)> {
+        let mut common: Option<Vec<(f64, f64)>> = None;
+        for (from, to) in self.changes.keys() {
+            let down = self.down_times(from, to);
+            common = Some(match common {
+                None => down,
+                Some(common) => intersection(&common, &down),
+            });
+        }
+        common.unwrap_or_default()
+    }
+
+    /// The measured connectivity; `None` for fewer than two vehicles or no time.
+    pub fn connectivity(&self, facts: &Facts) -> Option<Connectivity> {
+        let count = facts.vehicles.len();
+        let pieces = self.pieces(facts);
+        if count < 2 || pieces.is_empty() {
+            return None;
+        }
+        let connected: Vec<bool> = pieces.iter().map(|piece| has_root(count, &piece.edges)).collect();
+        let lost = |index: usize| if connected[index] { 0.0 } else { pieces[index].length_s };
+        let alpha = (0..pieces.len()).map(lost).sum::<f64>() / (self.end_s - self.start_s);
+        // T_0 from the largest rise of ∫(p − α) between two instants.
+        let (mut value, mut lowest, mut rise) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for (index, piece) in pieces.iter().enumerate() {
+            value += lost(index) - alpha * piece.length_s;
+            lowest = lowest.min(value);
+            rise = rise.max(value - lowest);
+        }
+        let t_0_s = (alpha < 1.0).then(|| rise / (1.0 - alpha));
+        Some(Connectivity { alpha, t_0_s, t_s: union_period(count, &pieces, &connected) })
+    }
+
+    /// The run cut at every change of a link, with the edges that are up in each piece.
+    fn pieces(&self, facts: &Facts) -> Vec<Piece> {
+        let index = |id: &str| facts.vehicles.iter().position(|vehicle| vehicle.id == id);
+        let mut edges = BTreeSet::new();
+        let mut events: Vec<(f64, usize, usize, bool)> = Vec::new();
+        for ((from, to), changes) in &self.changes {
+            let (Some(from), Some(to)) = (index(from), index(to)) else { continue };
+            if changes.first().is_none_or(|first| !first.1) {
+                edges.insert((from, to));
+            }
+            events.extend(changes.iter().map(|(at, up)| (*at, from, to, *up)));
+        }
+        events.sort_by(|a, b| a.0.total_cmp(&b.0));
+        events.push((self.end_s, 0, 0, false));
+        let (mut pieces, mut since) = (Vec::new(), self.start_s);
+        for (at, from, to, up) in events {
+            if at > since {
+                pieces.push(Piece { length_s: at - since, edges: edges.clone() });
+                since = at;
+            }
+            if up {
+                edges.insert((from, to))
+            } else {
+                edges.remove(&(from, to))
+            };
+        }
+        pieces
+    }
+}
+
+/// A time in which no link changes.
+struct Piece {
+    length_s: f64,
+    edges: BTreeSet<(usize, usize)>,
+}
+
+/// The longest wait, over all instants, until the links seen since then connect the fleet. It is longest just after
+/// a change, and waits that the end of the run cuts short are counted only as far as they went.
+fn union_period(count: usize, pieces: &[Piece], connected: &[bool]) -> Option<f64> {
+    let mut longest = 0.0_f64;
+    let mut complete = false;
+    for start in 0..pieces.len() {
+        if connected[start] {
+            complete = true;
+            continue;
+        }
+        let mut union = BTreeSet::new();
+        let mut waited = 0.0;
+        let end = pieces[start..].iter().find(|piece| {
+            union.extend(piece.edges.iter().copied());
+            let done = has_root(count, &union);
+            waited += if done { 0.0 } else { piece.length_s };
+            done
+        });
+        complete |= end.is_some();
+        longest = longest.max(waited);
+        if end.is_none() {
+            break;
+        }
+    }
+    complete.then_some(longest)
+}
+
+/// Whether some vehicle's messages can reach all others (a globally reachable vertex of the graph of who hears whom).
+fn has_root(count: usize, edges: &BTreeSet<(usize, usize)>) -> bool {
+    (0..count).any(|root| {
+        let mut reached = vec![false; count];
+        let mut open = vec![root];
+        reached[root] = true;
+        while let Some(vertex) = open.pop() {
+            for (_, to) in edges.range((vertex, 0)..=(vertex, usize::MAX)) {
+                if !reached[*to] {
+                    reached[*to] = true;
+                    open.push(*to);
+                }
+            }
+        }
+        reached.into_iter().all(|reached| reached)
+    })
+}
+
+fn intersection(a: &[(f64, f64)], b: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let (mut i, mut j, mut common) = (0, 0, Vec::new());
+    while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+        let (from, to) = (x.0.max(y.0), x.1.min(y.1));
+        if to > from {
+            common.push((from, to));
+        }
+        if x.1 < y.1 { i += 1 } else { j += 1 }
+    }
+    common
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::VehicleFacts;
+    use common::record::TopologyRow;
+
+    fn facts(links: &[(&str, &str)]) -> Facts {
+        let vehicle = |id: &str| VehicleFacts { id: id.into(), ..VehicleFacts::default() };
+        Facts {
+            vehicles: ["1", "2", "3"].map(vehicle).to_vec(),
+            links: links.iter().map(|(from, to)| ((*from).into(), (*to).into())).collect(),
+            message_bytes: 10,
+            duration_s: 100.0,
+            ..Facts::default()
+        }
+    }
+
+    fn change(t_s: i64, from: &str, to: &str, up: bool) -> Record {
+        Record::Topology(TopologyRow { t_ns: t_s * 1_000_000_000, from: from.into(), to: to.into(), up })
+    }
+
+    fn message(seq: u64, sent_ns: i64, fate: Fate) -> Record {
+        let (from, to) = ("1".into(), "2".into());
+        Record::Message(MessageRow { t_ns: sent_ns + 5, from, to, seq, sent_ns, due_ns: sent_ns + 5_000_000_000, fate })
+    }
+
+    fn link_1_2(rows: &[Record]) -> LinkSummary {
+        let facts = facts(&[("1", "2")]);
+        links(rows, &facts, &Network::of(rows, &facts)).remove(0)
+    }
+
+    #[test]
+    fn every_message_has_one_fate() {
+        let fates = [Fate::Delivered, Fate::Lost, Fate::LinkDown, Fate::QueueFull, Fate::InFlight, Fate::Delivered];
+        let rows: Vec<Record> = (0..).zip(fates).map(|(seq, fate)| message(seq, seq as i64, fate)).collect();
+        let link = link_1_2(&rows);
+        assert!(link.balanced);
+        assert_eq!((link.sent, link.delivered, link.delivered_bytes), (6, 2, 20));
+        assert_eq!(link.delay, Some(Spread { median: 5.0, p99: 5.0, max: 5.0 }));
+        assert_eq!(transmissions(&rows), 6);
+    }
+
+    #[test]
+    fn a_message_without_a_fate_or_with_two_unbalances_the_ledger() {
+        let gap = link_1_2(&[message(0, 0, Fate::Delivered), message(2, 2, Fate::Delivered)]);
+        assert_eq!((gap.missing, gap.balanced), (1, false));
+        let twice = link_1_2(&[message(0, 0, Fate::Delivered), message(0, 0, Fate::Lost)]);
+        assert_eq!((twice.repeated, twice.sent, twice.balanced), (1, 1, false));
+        let second_life = link_1_2(&[message(7, 0, Fate::Delivered), message(0, 5, Fate::Delivered)]);
+        assert!(second_life.balanced);
+    }
+
+    #[test]
+    fn links_that_only_the_recording_knows_are_listed_too() {
+        let facts = facts(&[("2", "1")]);
+        let rows = [message(0, 0, Fate::Delivered)];
+        let links = links(&rows, &facts, &Network::of(&rows, &facts));
+        let names: Vec<_> = links.iter().map(|link| (link.from.as_str(), link.sent)).collect();
+        assert_eq!(names, [("2", 0), ("1", 1)]);
+    }
+
+    #[test]
+    fn up_times_are_measured() {
+        let rows = [change(0, "1", "2", false), change(25, "1", "2", true), change(90, "1", "2", false)];
+        let link = link_1_2(&rows);
+        assert!((link.up_fraction - 0.65).abs() < 1e-12);
+        assert_eq!(link.longest_outage_s, 25.0);
+        // The first thing said of a link is that it comes up: it was down before.
+        assert_eq!(link_1_2(&[change(40, "1", "2", true)]).longest_outage_s, 40.0);
+        assert_eq!(link_1_2(&[]).up_fraction, 1.0);
+    }
+
+    /// Example 4.1: both links fail during 7.5 s of every 10 s.
+    #[test]
+    fn periodic_losses_have_the_connectivity_of_the_example() {
+        let links = [("1", "2"), ("2", "1"), ("2", "3"), ("3", "2")];
+        let mut rows = Vec::new();
+        for (from, to) in links {
+            for period in 0..10 {
+                let at = |t_ns: i64, up| {
+                    Record::Topology(TopologyRow { t_ns: t_ns * 1_000_000, from: from.into(), to: to.into(), up })
+                };
+                rows.extend([at(period * 10_000, true), at(period * 10_000 + 2_500, false)]);
+            }
+        }
+        let facts = facts(&links);
+        let network = Network::of(&rows, &facts);
+        let connectivity = network.connectivity(&facts).expect("three vehicles");
+        assert!((connectivity.alpha - 0.75).abs() < 1e-12);
+        assert!((connectivity.t_0_s.expect("connected at times") - 7.5).abs() < 1e-9);
+        assert!((connectivity.t_s.expect("connected") - 7.5).abs() < 1e-9);
+        assert_eq!(network.blackouts().len(), 10);
+    }
+
+    #[test]
+    fn links_that_are_never_up_together_connect_in_their_union() {
+        let links = [("1", "2"), ("2", "3")];
+        let mut rows = Vec::new();
+        for turn in 0..10 {
+            let at = turn * 10;
+            rows.extend([change(at, "1", "2", true), change(at, "2", "3", false)]);
+            rows.extend([change(at + 4, "1", "2", false), change(at + 4, "2", "3", true)]);
+        }
+        let facts = facts(&links);
+        let connectivity = Network::of(&rows, &facts).connectivity(&facts).expect("three vehicles");
+        assert_eq!((connectivity.alpha, connectivity.t_s), (1.0, Some(6.0)));
+        assert!(Network::of(&rows, &facts).blackouts().is_empty());
+    }
+
+    #[test]
+    fn one_direction_is_enough_for_a_leader() {
+        let connected = |edges: &[(usize, usize)]| has_root(3, &edges.iter().copied().collect());
+        assert!(connected(&[(0, 1), (1, 2)]));
+        assert!(!connected(&[(0, 1), (2, 1)]));
+    }
+}

@@ -1,0 +1,177 @@
+//! Time series of a fleet, out of the rows of its recording.
+
+use common::record::{Record, SpeedRow, StateRow};
+
+use super::Facts;
+use super::statistics::mean;
+
+/// The rows of one vehicle in order of time.
+#[derive(Clone, Debug)]
+pub struct Track<'a> {
+    /// Its name.
+    pub id: &'a str,
+    /// Its place in the pattern.
+    pub pattern_offset: f64,
+    /// Its states.
+    pub rows: Vec<&'a StateRow>,
+}
+
+/// The tracks of a fleet in the mission's order, vehicles without rows included.
+pub fn tracks<'a>(exact: &'a [Record], facts: &'a Facts) -> Vec<Track<'a>> {
+    let mut tracks: Vec<Track<'a>> = facts
+        .vehicles
+        .iter()
+        .map(|vehicle| Track { id: &vehicle.id, pattern_offset: vehicle.pattern_offset, rows: Vec::new() })
+        .collect();
+    let mut guess = 0;
+    for record in exact {
+        let Record::State(row) = record else { continue };
+        // Vehicles report in turn: the next one is most often the right one.
+        let found = match tracks.get(guess) {
+            Some(track) if track.id == row.vehicle => Some(guess),
+            _ => tracks.iter().position(|track| track.id == row.vehicle),
+        };
+        if let Some(index) = found {
+            tracks[index].rows.push(row);
+            guess = (index + 1) % tracks.len();
+        }
+    }
+    for track in &mut tracks {
+        track.rows.sort_by_key(|row| row.t_ns);
+    }
+    tracks
+}
+
+/// The changes of the formation speed, in order of time.
+pub fn speeds(exact: &[Record]) -> Vec<&SpeedRow> {
+    let rows = exact.iter().filter_map(|record| match record {
+        Record::Speed(row) => Some(row),
+        _ => None,
+    });
+    let mut rows: Vec<&SpeedRow> = rows.collect();
+    rows.sort_by_key(|row| row.t_ns);
+    rows
+}
+
+/// The coordination states of a fleet with the pattern removed, ξ_i − h_i, at common instants.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Coordination {
+    /// The instants \[s\]: those of the first vehicle at which every other vehicle is known too.
+    pub t_s: Vec<f64>,
+    /// For each vehicle that has rows, in the mission's order, its state at these instants.
+    pub states: Vec<Vec<f64>>,
+}
+
+impl Coordination {
+    /// Puts the tracks on common instants. Between two rows of a vehicle its state is interpolated linearly, if they
+    /// are not further apart than ten control periods: of a vehicle that was silent longer nothing is claimed.
+    pub fn of(tracks: &[Track<'_>], facts: &Facts) -> Coordination {
+        let gap_ns = (10.0 * facts.control_period_s * 1e9) as i64;
+        let present: Vec<&Track<'_>> = tracks.iter().filter(|track| !track.rows.is_empty()).collect();
+        let mut cursors = vec![0; present.len()];
+        let mut coordination = Coordination { t_s: Vec::new(), states: vec![Vec::new(); present.len()] };
+        let Some(first) = present.first() else { return coordination };
+        let mut states = Vec::with_capacity(present.len());
+        for row in &first.rows {
+            states.clear();
+            for (track, cursor) in present.iter().zip(&mut cursors) {
+                let Some(xi) = interpolate(&track.rows, cursor, row.t_ns, gap_ns) else { break };
+                states.push(xi - track.pattern_offset);
+            }
+            if states.len() == present.len() {
+                coordination.t_s.push(row.t_ns as f64 / 1e9);
+                coordination.states.iter_mut().zip(&states).for_each(|(series, state)| series.push(*state));
+            }
+        }
+        coordination
+    }
+
+    /// The largest difference between two vehicles, max |x_i − x_j|, over time.
+    pub fn spread(&self) -> Vec<f64> {
+        self.over_time(|states| {
+            let low = states.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = states.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if states.is_empty() { 0.0 } else { high - low }
+        })
+    }
+
+    /// ‖(I − 11ᵀ/n) x‖, the norm of what the states differ from their mean by, over time.
+    pub fn norm(&self) -> Vec<f64> {
+        self.over_time(|states| {
+            let mean = mean(states.iter().copied());
+            states.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>().sqrt()
+        })
+    }
+
+    fn over_time(&self, value: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+        let mut states = Vec::with_capacity(self.states.len());
+        let at = |index: usize| {
+            states.clear();
+            states.extend(self.states.iter().map(|series| series[index]));
+            value(&states)
+        };
+        (0..self.t_s.len()).map(at).collect()
+    }
+}
+
+fn interpolate(rows: &[&StateRow], cursor: &mut usize, t_ns: i64, gap_ns: i64) -> Option<f64> {
+    while rows.get(*cursor).is_some_and(|row| row.t_ns < t_ns) {
+        *cursor += 1;
+    }
+    let after = rows.get(*cursor)?;
+    if after.t_ns == t_ns {
+        return Some(after.xi);
+    }
+    let before = rows.get(cursor.checked_sub(1)?)?;
+    let span_ns = after.t_ns - before.t_ns;
+    let part = (t_ns - before.t_ns) as f64 / span_ns as f64;
+    (span_ns <= gap_ns).then(|| before.xi + part * (after.xi - before.xi))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::VehicleFacts;
+    use crate::results::testing::state_row;
+
+    fn facts() -> Facts {
+        let vehicle = |id: &str, pattern_offset| VehicleFacts { id: id.into(), pattern_offset, ..Default::default() };
+        Facts { vehicles: vec![vehicle("a", 0.5), vehicle("b", -0.25)], control_period_s: 0.1, ..Facts::default() }
+    }
+
+    fn coordination(rows: &[(i64, &str, f64)]) -> Coordination {
+        let exact: Vec<Record> =
+            rows.iter().map(|(ms, id, xi)| Record::State(state_row(ms * 1_000_000, id, *xi))).collect();
+        let facts = facts();
+        Coordination::of(&tracks(&exact, &facts), &facts)
+    }
+
+    #[test]
+    fn the_pattern_is_removed() {
+        let coordination = coordination(&[(0, "a", 1.5), (0, "b", 0.75), (100, "a", 1.75), (100, "b", 0.75)]);
+        assert_eq!(coordination.spread(), [0.0, 0.25]);
+        let expected = 0.25 / 2.0_f64.sqrt();
+        assert!(
+            coordination.norm().iter().zip([0.0, expected]).all(|(norm, expected)| (norm - expected).abs() < 1e-15)
+        );
+    }
+
+    #[test]
+    fn vehicles_that_report_at_other_instants_are_interpolated() {
+        let coordination = coordination(&[(0, "b", 0.0), (50, "a", 0.75), (100, "b", 1.0)]);
+        assert_eq!(coordination.states, [[0.25], [0.75]]);
+    }
+
+    #[test]
+    fn nothing_is_claimed_of_a_vehicle_that_was_silent() {
+        let rows =
+            [(0, "b", 0.0), (0, "a", 0.0), (1000, "a", 0.0), (2000, "a", 0.0), (2000, "b", 0.0), (2100, "a", 0.0)];
+        assert_eq!(coordination(&rows).t_s, [0.0, 2.0]);
+    }
+
+    #[test]
+    fn a_fleet_of_one_or_none_is_coordinated() {
+        assert_eq!(coordination(&[(0, "a", 1.0)]).spread(), [0.0]);
+        assert_eq!(coordination(&[]).norm(), [0.0; 0]);
+    }
+}

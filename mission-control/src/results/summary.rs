@@ -1,0 +1,491 @@
+//! The numbers of a run: `summary.json`, a function of mission and seed, and `clock.json`, of the machine too.
+
+use bus::recording::Recording;
+use common::record::{ClockRecord, SpeedRow};
+use serde::Serialize;
+
+use super::Facts;
+use super::network::{Connectivity, LinkSummary, Network, Spread, links, transmissions};
+use super::series::{Coordination, Track, speeds, tracks};
+use super::statistics::{ExponentialFit, fit_exponential, largest, mean, rms, settling_time, steady_from};
+
+/// A fleet counts as coordinated when its largest difference stays below this \[units of ξ\].
+pub const COORDINATION_THRESHOLD: f64 = 1e-2;
+/// A vehicle counts as on its path when its path-following error stays below this \[m\].
+pub const PATH_THRESHOLD_M: f64 = 0.1;
+/// Settling, without an absolute threshold, means to stay below this part of the largest value.
+pub const SETTLED_PART: f64 = 0.02;
+/// Time series in the summary have at most about this many samples.
+const SERIES_SAMPLES: usize = 600;
+
+/// Everything that mission and seed determine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Version of this layout.
+    pub format: u32,
+    /// Name of the mission.
+    pub mission: String,
+    /// Digest of the mission file.
+    pub digest: String,
+    /// The seed.
+    pub seed: u64,
+    /// Length of the mission \[s\].
+    pub duration_s: f64,
+    /// Whether the recording reaches its end.
+    pub complete: bool,
+    /// The fleet as a whole.
+    pub fleet: FleetSummary,
+    /// Each vehicle, in the mission's order.
+    pub vehicles: Vec<VehicleSummary>,
+    /// Each directed link.
+    pub links: Vec<LinkSummary>,
+    /// What a reader should not overlook.
+    pub warnings: Vec<String>,
+}
+
+/// The numbers of the fleet.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FleetSummary {
+    /// Coordination errors.
+    pub coordination: CoordinationSummary,
+    /// Mean rate of the coordination states in the steady part of the run \[units of ξ per s\].
+    pub steady_speed: f64,
+    /// What theory predicts for it.
+    pub predicted_speed: Option<f64>,
+    /// The formation speed that was commanded last.
+    pub formation_speed: Option<f64>,
+    /// Largest path-following error of any vehicle at the end \[m\].
+    pub path_error_final_m: f64,
+    /// When the last vehicle was on its path to stay, within 0.1 m \[s\].
+    pub on_path_s: Option<f64>,
+    /// Messages on all links.
+    pub messages: MessageTotals,
+    /// Measured connectivity of the network.
+    pub connectivity: Option<Connectivity>,
+}
+
+/// How the fleet agreed. x_i = ξ_i − h_i, the coordination state with the pattern removed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CoordinationSummary {
+    /// Unit of all values.
+    pub unit: String,
+    /// max |x_i − x_j| at the first common instant.
+    pub initial: f64,
+    /// Its largest value.
+    pub largest: f64,
+    /// Its value at the end.
+    pub last: f64,
+    /// Its root mean square in the steady part.
+    pub steady_rms: f64,
+    /// From when on it stayed below 2 % of its largest value \[s\].
+    pub settled_s: Option<f64>,
+    /// From when on it stayed below 0.01 \[s\].
+    pub settled_absolute_s: Option<f64>,
+    /// The exponential fitted to ‖(I − 11ᵀ/n)x‖.
+    pub fit: Option<ExponentialFit>,
+    /// The rate that theory guarantees for that norm \[1/s\].
+    pub guaranteed_rate: Option<f64>,
+    /// Whether the fitted rate is at least the guaranteed one; `None` if one of them is not known.
+    pub at_least_guaranteed: Option<bool>,
+    /// The error over time.
+    pub series: CoordinationSeries,
+}
+
+/// The coordination error over time, thinned.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CoordinationSeries {
+    /// Instants \[s\].
+    pub t_s: Vec<f64>,
+    /// max |x_i − x_j|.
+    pub largest: Vec<f64>,
+    /// ‖(I − 11ᵀ/n)x‖.
+    pub norm: Vec<f64>,
+}
+
+/// Sums over all links.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct MessageTotals {
+    /// Messages times the links that they were sent on.
+    pub sent: u64,
+    /// Delivered.
+    pub delivered: u64,
+    /// Dropped, by cause.
+    pub lost: u64,
+    /// Dropped because the link was down.
+    pub link_down: u64,
+    /// Dropped because a queue was full.
+    pub queue_full: u64,
+    /// Under way at the end.
+    pub in_flight: u64,
+    /// Transmissions: a message to several receivers goes on the air once.
+    pub transmissions: u64,
+    /// Size of one message \[bytes\].
+    pub message_bytes: u64,
+    /// Transmissions times size.
+    pub bytes_on_air: u64,
+    /// Whether the ledger of every link is balanced.
+    pub balanced: bool,
+}
+
+/// The numbers of one vehicle. "Steady" is the last fifth of its rows, in whole periods of the network.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VehicleSummary {
+    /// Its name.
+    pub id: String,
+    /// Its path.
+    pub path: String,
+    /// Its place in the pattern.
+    pub pattern_offset: f64,
+    /// Rows of its state.
+    pub rows: u64,
+    /// x_i − x_1 at the end.
+    pub coordination_final: f64,
+    /// Mean rate of ξ in the steady part \[units of ξ per s\].
+    pub steady_speed: f64,
+    /// Mean forward speed in the steady part \[m/s\].
+    pub steady_speed_mps: f64,
+    /// Root mean square of ξ's rate minus its reference, v_r, in the steady part.
+    pub speed_error_rms: f64,
+    /// Largest magnitude of that in the steady part.
+    pub speed_error_max: f64,
+    /// Path-following error at the end \[m\].
+    pub path_error_final_m: f64,
+    /// Largest path-following error \[m\].
+    pub path_error_largest_m: f64,
+    /// Largest path-following error after settling (in the steady part, if it did not settle) \[m\].
+    pub path_error_after_settling_m: f64,
+    /// Root mean square of the path-following error in the steady part \[m\].
+    pub path_error_rms_m: f64,
+    /// From when on it stayed below 2 % of its largest value \[s\].
+    pub path_settled_s: Option<f64>,
+    /// From when on it stayed below 0.1 m \[s\].
+    pub on_path_s: Option<f64>,
+    /// Mean along-track error in the steady part \[m\].
+    pub along_mean_m: f64,
+    /// What theory predicts for it.
+    pub predicted_along_bias_m: Option<f64>,
+    /// Root mean square of the cross-track error in the steady part \[m\].
+    pub cross_rms_m: f64,
+    /// Root mean square of the heading error in the steady part \[rad\].
+    pub heading_rms_rad: f64,
+    /// Part of the rows in which it had no neighbour.
+    pub alone_fraction: f64,
+}
+
+/// Everything that depends on the wall clock and the machine.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ClockSummary {
+    /// Version of this layout.
+    pub format: u32,
+    /// Lateness of the deliveries: achieved minus commanded delay.
+    pub deliveries: Option<DeliverySummary>,
+    /// Deadlines of the control loops.
+    pub deadlines: Vec<DeadlineSummary>,
+    /// What the programs had to say.
+    pub notes: Vec<NoteSummary>,
+}
+
+/// Lateness of deliveries.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeliverySummary {
+    /// Number of deliveries.
+    pub count: u64,
+    /// Commanded delay \[s\].
+    pub commanded_s: Spread,
+    /// Achieved minus commanded \[s\].
+    pub late_s: Spread,
+}
+
+/// Deadlines of one vehicle's control loop.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeadlineSummary {
+    /// The vehicle.
+    pub vehicle: String,
+    /// Deadlines met.
+    pub met: u64,
+    /// Deadlines missed.
+    pub missed: u64,
+    /// Largest lateness of one that was met \[s\].
+    pub worst_late_s: f64,
+}
+
+/// A line for people.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoteSummary {
+    /// When, in mission time \[s\].
+    pub t_s: f64,
+    /// Who says it.
+    pub source: String,
+    /// What.
+    pub text: String,
+    /// How often.
+    pub count: u64,
+}
+
+/// The numbers of a run that mission and seed determine.
+pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
+    let exact = &recording.exact;
+    let tracks = tracks(exact, facts);
+    let coordination = Coordination::of(&tracks, facts);
+    let network = Network::of(exact, facts);
+    let links = links(exact, facts, &network);
+    let vehicles: Vec<VehicleSummary> = tracks.iter().map(|track| vehicle(track, &tracks, facts)).collect();
+    let present = || vehicles.iter().filter(|vehicle| vehicle.rows > 0);
+    let fleet = FleetSummary {
+        steady_speed: mean(present().map(|vehicle| vehicle.steady_speed)),
+        predicted_speed: facts.predicted_speed,
+        formation_speed: speeds(exact).last().map(|row| row.speed),
+        path_error_final_m: largest(present().map(|vehicle| vehicle.path_error_final_m)),
+        on_path_s: present().map(|vehicle| vehicle.on_path_s).collect::<Option<Vec<f64>>>().map(largest),
+        messages: totals(&links, transmissions(exact), facts.message_bytes),
+        connectivity: network.connectivity(facts),
+        coordination: coordination_summary(&coordination, facts),
+    };
+    let warnings = warnings(recording, &vehicles, &links);
+    Summary {
+        format: 1,
+        mission: facts.mission.clone(),
+        digest: recording.digest.clone(),
+        seed: recording.seed,
+        duration_s: facts.duration_s,
+        complete: recording.complete,
+        fleet,
+        vehicles,
+        links,
+        warnings,
+    }
+}
+
+/// The numbers of a run that depend on the wall clock.
+pub fn summarise_clock(recording: &Recording) -> ClockSummary {
+    let (mut commanded, mut late) = (Vec::new(), Vec::new());
+    let mut summary = ClockSummary { format: 1, ..ClockSummary::default() };
+    for record in &recording.clock {
+        match record {
+            ClockRecord::Achieved(row) => {
+                commanded.push(row.commanded_ns as f64 / 1e9);
+                late.push(row.late_ns as f64 / 1e9);
+            }
+            ClockRecord::Ticks(row) => {
+                let worst_late_s = row.worst_late_ns as f64 / 1e9;
+                match summary.deadlines.iter_mut().find(|deadlines| deadlines.vehicle == row.vehicle) {
+                    Some(deadlines) => {
+                        deadlines.met += row.met;
+                        deadlines.missed += row.missed;
+                        deadlines.worst_late_s = deadlines.worst_late_s.max(worst_late_s);
+                    }
+                    None => summary.deadlines.push(DeadlineSummary {
+                        vehicle: row.vehicle.clone(),
+                        met: row.met,
+                        missed: row.missed,
+                        worst_late_s,
+                    }),
+                }
+            }
+            ClockRecord::Note(row) => summary.notes.push(NoteSummary {
+                t_s: row.t_ns as f64 / 1e9,
+                source: row.source.clone(),
+                text: row.text.clone(),
+                count: row.count,
+            }),
+        }
+    }
+    summary.deadlines.sort_by(|a, b| a.vehicle.cmp(&b.vehicle));
+    summary.deliveries = Spread::of(&commanded).zip(Spread::of(&late)).map(|(commanded_s, late_s)| DeliverySummary {
+        count: late.len() as u64,
+        commanded_s,
+        late_s,
+    });
+    summary
+}
+
+fn coordination_summary(coordination: &Coordination, facts: &Facts) -> CoordinationSummary {
+    let (t_s, spread, norm) = (&coordination.t_s, coordination.spread(), coordination.norm());
+    let peak = largest(spread.iter().copied());
+    let fit = fit_exponential(t_s, &norm, facts.link_period_s);
+    let kept = thinned(t_s.len(), SERIES_SAMPLES);
+    let pick = |values: &[f64]| kept.iter().map(|index| values[*index]).collect();
+    let steady = steady_part(t_s, facts);
+    CoordinationSummary {
+        unit: facts.xi_unit.clone(),
+        initial: spread.first().copied().unwrap_or(0.0),
+        largest: peak,
+        last: spread.last().copied().unwrap_or(0.0),
+        steady_rms: rms(spread[steady..].iter().copied()),
+        settled_s: settling_time(t_s, &spread, SETTLED_PART * peak),
+        settled_absolute_s: settling_time(t_s, &spread, COORDINATION_THRESHOLD),
+        fit,
+        guaranteed_rate: facts.guaranteed_rate,
+        at_least_guaranteed: fit.zip(facts.guaranteed_rate).map(|(fit, guaranteed)| fit.rate >= guaranteed),
+        series: CoordinationSeries { t_s: pick(t_s), largest: pick(&spread), norm: pick(&norm) },
+    }
+}
+
+fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts) -> VehicleSummary {
+    let rows = &track.rows;
+    let t_s: Vec<f64> = rows.iter().map(|row| row.t_ns as f64 / 1e9).collect();
+    let errors: Vec<f64> = rows.iter().map(|row| row.e_norm_m).collect();
+    let steady_index = steady_part(&t_s, facts);
+    let steady = &rows[steady_index..];
+    let peak = largest(errors.iter().copied());
+    let path_settled_s = settling_time(&t_s, &errors, SETTLED_PART * peak);
+    let settled_index = path_settled_s.map_or(steady_index, |settled| t_s.partition_point(|time| *time < settled));
+    let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - track.pattern_offset);
+    let first = all.iter().find_map(removed);
+    let planned = facts.vehicles.iter().find(|vehicle| vehicle.id == track.id);
+    VehicleSummary {
+        id: track.id.to_owned(),
+        path: planned.map(|vehicle| vehicle.path.clone()).unwrap_or_default(),
+        pattern_offset: track.pattern_offset,
+        rows: rows.len() as u64,
+        coordination_final: removed(track).zip(first).map_or(0.0, |(own, first)| own - first),
+        steady_speed: match (steady.first(), steady.last()) {
+            // The mean rate exactly, not the mean of samples of the rate.
+            (Some(a), Some(b)) if b.t_ns > a.t_ns => (b.xi - a.xi) / ((b.t_ns - a.t_ns) as f64 / 1e9),
+            _ => rows.last().map_or(0.0, |row| row.xi_rate),
+        },
+        steady_speed_mps: mean(steady.iter().map(|row| row.speed_mps)),
+        speed_error_rms: rms(steady.iter().map(|row| row.xi_rate - row.v_ref)),
+        speed_error_max: largest(steady.iter().map(|row| (row.xi_rate - row.v_ref).abs())),
+        path_error_final_m: errors.last().copied().unwrap_or(0.0),
+        path_error_largest_m: peak,
+        path_error_after_settling_m: largest(errors[settled_index..].iter().copied()),
+        path_error_rms_m: rms(errors[steady_index..].iter().copied()),
+        path_settled_s,
+        on_path_s: settling_time(&t_s, &errors, PATH_THRESHOLD_M),
+        along_mean_m: mean(steady.iter().map(|row| row.e_along_m)),
+        predicted_along_bias_m: facts.predicted_along_bias_m,
+        cross_rms_m: rms(steady.iter().map(|row| row.e_cross_m)),
+        heading_rms_rad: rms(steady.iter().map(|row| row.psi_e_rad)),
+        alone_fraction: mean(rows.iter().map(|row| f64::from(u8::from(row.neighbours == 0)))),
+    }
+}
+
+/// The index at which the steady part begins.
+fn steady_part(t_s: &[f64], facts: &Facts) -> usize {
+    let (Some(first), Some(last)) = (t_s.first(), t_s.last()) else { return 0 };
+    let from = steady_from(*last, *first, facts.link_period_s);
+    t_s.partition_point(|time| *time < from - 1e-9)
+}
+
+fn totals(links: &[LinkSummary], transmissions: u64, message_bytes: u64) -> MessageTotals {
+    let sum = |value: fn(&LinkSummary) -> u64| links.iter().map(value).sum();
+    MessageTotals {
+        sent: sum(|link| link.sent),
+        delivered: sum(|link| link.delivered),
+        lost: sum(|link| link.lost),
+        link_down: sum(|link| link.link_down),
+        queue_full: sum(|link| link.queue_full),
+        in_flight: sum(|link| link.in_flight),
+        transmissions,
+        message_bytes,
+        bytes_on_air: transmissions * message_bytes,
+        balanced: links.iter().all(|link| link.balanced),
+    }
+}
+
+fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSummary]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !recording.complete {
+        let how = recording.damage.as_ref().map_or(String::new(), |damage| format!(" ({damage})"));
+        warnings.push(format!("The recording ends before its end{how}: what follows is about the part that was kept."));
+    }
+    for vehicle in vehicles.iter().filter(|vehicle| vehicle.rows == 0) {
+        warnings.push(format!("{} has no rows: it is not part of the fleet's numbers.", vehicle.id));
+    }
+    for link in links.iter().filter(|link| !link.balanced) {
+        warnings.push(format!(
+            "The ledger of {} → {} is not balanced: {} messages without a fate, {} with more than one.",
+            link.from, link.to, link.missing, link.repeated
+        ));
+    }
+    warnings
+}
+
+/// Indices of about `samples` evenly spaced entries of `count`, first and last included.
+pub(super) fn thinned(count: usize, samples: usize) -> Vec<usize> {
+    if count <= samples {
+        return (0..count).collect();
+    }
+    (0..samples).map(|step| step * (count - 1) / (samples - 1)).collect()
+}
+
+/// The last formation speed before or at `t_ns`.
+pub(super) fn formation_speed_at(speeds: &[&SpeedRow], t_ns: i64) -> Option<f64> {
+    speeds.iter().rev().find(|row| row.t_ns <= t_ns).map(|row| row.speed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::testing::{facts, fleet};
+    use common::record::Record;
+
+    #[test]
+    fn the_fleet_is_summarised() {
+        let summary = summarise(&fleet(true), &facts(true));
+        let coordination = &summary.fleet.coordination;
+        assert!((coordination.initial - 21.6).abs() < 0.01, "{}", coordination.initial);
+        assert!((coordination.fit.expect("decays").rate - 0.025).abs() < 0.002, "{:?}", coordination.fit);
+        assert_eq!(coordination.at_least_guaranteed, Some(true));
+        // 2 % of the start is reached after ln 50 / 0.025 s.
+        let settled = coordination.settled_s.expect("settles");
+        assert!((settled - 156.5).abs() < 11.0, "{settled}");
+        assert!((summary.fleet.steady_speed - 0.5).abs() < 1e-3);
+        assert_eq!(summary.fleet.formation_speed, Some(0.5));
+        assert_eq!(coordination.series.t_s.len(), 600);
+        assert_eq!(coordination.series.t_s.last(), Some(&400.0));
+    }
+
+    #[test]
+    fn vehicles_and_links_are_summarised() {
+        let summary = summarise(&fleet(true), &facts(true));
+        let vehicle = &summary.vehicles[2];
+        assert_eq!((vehicle.id.as_str(), vehicle.rows), ("v3", 4001));
+        assert!((vehicle.path_error_largest_m - 9.01).abs() < 1e-9);
+        // 9·exp(−0.06 t) + 0.01 = 0.1
+        assert!((vehicle.on_path_s.expect("settles") - 100.0_f64.ln() / 0.06).abs() < 0.1);
+        assert!((vehicle.path_error_rms_m - 0.01).abs() < 1e-6);
+        assert!((vehicle.alone_fraction - 0.75).abs() < 1e-3);
+        let totals = &summary.fleet.messages;
+        assert!(totals.balanced && summary.warnings.is_empty(), "{:?}", summary.warnings);
+        assert_eq!(totals.sent, 4 * 801);
+        // v2 speaks to both neighbours at once.
+        assert_eq!(totals.transmissions, 3 * 801);
+        assert_eq!(totals.bytes_on_air, 3 * 801 * 40);
+        assert!((summary.links[0].up_fraction - 0.25).abs() < 1e-9);
+        assert!((summary.fleet.connectivity.expect("three vehicles").alpha - 0.75).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_clock_stays_out_of_the_summary() {
+        let (with_clock, mut without) = (fleet(true), fleet(true));
+        without.clock.clear();
+        assert_eq!(summarise(&with_clock, &facts(true)), summarise(&without, &facts(true)));
+        let clock = summarise_clock(&with_clock);
+        let late = clock.deliveries.expect("deliveries").late_s;
+        assert_eq!((late.median, late.max), (60e-6, 2e-3));
+        assert_eq!(clock.deadlines.iter().map(|deadlines| deadlines.missed).sum::<u64>(), 6);
+        assert_eq!(clock.notes.len(), 1);
+        assert_eq!(summarise_clock(&without), ClockSummary { format: 1, ..ClockSummary::default() });
+    }
+
+    #[test]
+    fn the_order_of_rows_does_not_matter() {
+        let mut shuffled = fleet(false);
+        shuffled.exact.reverse();
+        assert_eq!(summarise(&shuffled, &facts(false)), summarise(&fleet(false), &facts(false)));
+    }
+
+    #[test]
+    fn an_empty_or_cut_recording_is_summarised_with_a_warning() {
+        let summary = summarise(&Recording::default(), &facts(true));
+        assert_eq!(summary.warnings.len(), 4, "{:?}", summary.warnings);
+        assert!(serde_json::to_string(&summary).expect("serialises").contains("\"steady_speed\":0.0"));
+        let mut lacking = fleet(true);
+        lacking.exact.retain(|record| !matches!(record, Record::Message(row) if row.seq == 7 && row.to == "v2"));
+        let summary = summarise(&lacking, &facts(true));
+        assert!(!summary.fleet.messages.balanced);
+        assert_eq!(summary.warnings.len(), 2, "{:?}", summary.warnings);
+    }
+}
