@@ -10,7 +10,7 @@ use common::record::Row;
 use common::time::Time;
 use common::wire::fleet::{Pace, ToFleet};
 use common::wire::vehicle::{ClockPlan, Phase};
-use network_emulator::hub::{Hub, HubInput, HubOutput};
+use network_emulator::hub::{COLLECTOR, Hub, HubInput, HubOutput};
 use vehicle_node::node::{NodeInput, NodeOutput, VehicleNode};
 
 use crate::conduct::{Conduct, ConductInput, ConductOutput};
@@ -74,7 +74,7 @@ pub fn simulate(
             if fleet.now > told {
                 told = fleet.now;
                 if !progress(told) {
-                    fleet.hub.handle(told, Some(HubInput::FromControl(ToFleet::Stop)));
+                    fleet.hub.handle(told, Some(from_control(ToFleet::Stop)));
                     fleet.drain_hub(&mut record);
                 }
             }
@@ -89,6 +89,10 @@ pub fn simulate(
         }
         fleet.drain_conduct();
     }
+}
+
+fn from_control(message: ToFleet) -> HubInput {
+    HubInput::FromControl { who: COLLECTOR.to_string(), message }
 }
 
 impl Fleet<'_> {
@@ -117,7 +121,7 @@ impl Fleet<'_> {
                         self.events.push_back(Event::ToNode(index, NodeInput::Message(message)));
                     }
                 }
-                HubOutput::ToControl(message) => {
+                HubOutput::ToControl { message, .. } => {
                     self.events.push_back(Event::ToConduct(ConductInput::FromFleet(message)));
                 }
                 HubOutput::Record(row) => record(row),
@@ -126,8 +130,9 @@ impl Fleet<'_> {
                 }
                 // A stepped clock delivers with the grant; logs are not files here; the console is elsewhere.
                 HubOutput::Deliver(..)
-                | HubOutput::OpenLog(_)
+                | HubOutput::OpenLog { .. }
                 | HubOutput::CloseLog
+                | HubOutput::Dismissed
                 | HubOutput::FollowClock(_)
                 | HubOutput::ReadLog { .. }
                 | HubOutput::Say(_) => {}
@@ -144,8 +149,11 @@ impl Fleet<'_> {
                     self.events.push_back(Event::ToHub(HubInput::FromVehicle(id, message)));
                 }
                 NodeOutput::Record(row) => record(row),
+                NodeOutput::OpenLog { .. } => {
+                    self.events.push_back(Event::ToNode(index, NodeInput::LogOpened { last: None }));
+                }
                 NodeOutput::Transmit(_)
-                | NodeOutput::OpenLog(_)
+                | NodeOutput::Dismissed
                 | NodeOutput::CloseLog
                 | NodeOutput::FollowClock(_)
                 | NodeOutput::ReadLog { .. }
@@ -157,7 +165,7 @@ impl Fleet<'_> {
     fn drain_conduct(&mut self) {
         while let Some(output) = self.conduct.poll_output() {
             match output {
-                ConductOutput::Send(message) => self.events.push_back(Event::ToHub(HubInput::FromControl(message))),
+                ConductOutput::Send(message) => self.events.push_back(Event::ToHub(from_control(message))),
                 ConductOutput::Over(phase) => self.outcome = Some(Ok(phase)),
                 ConductOutput::Failed(reason) => self.outcome = Some(Err(reason)),
                 ConductOutput::Progress(..) | ConductOutput::Log { .. } | ConductOutput::Done { .. } => {}

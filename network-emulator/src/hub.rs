@@ -17,6 +17,10 @@ use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase,
 use crate::emulator::{Channel, Emulator, Sent};
 use crate::lockstep::Lockstep;
 
+/// Name under which mission-control joins when it conducts a flight and collects its logs.
+pub const COLLECTOR: &str = "mission-control";
+/// Name under which single commands (status, speed, stop) join.
+pub const OPERATOR: &str = "operator";
 /// Name of the hub as a source of logs and notes.
 pub const HUB: &str = "network-emulator";
 
@@ -34,8 +38,15 @@ pub enum HubInput {
     FromVehicle(String, FromVehicle),
     /// A vehicle put bytes on the air.
     State(String, Vec<u8>),
-    /// Mission-control said something.
-    FromControl(ToFleet),
+    /// Mission-control, or an operator at another terminal, said something.
+    FromControl {
+        /// Who: the answer goes there.
+        who: String,
+        /// What.
+        message: ToFleet,
+    },
+    /// The log could not be opened, and why.
+    LogFailed(String),
     /// The driver has started the clock.
     ClockStarted(ClockPlan),
     /// A piece of the hub's own log, as asked for.
@@ -49,10 +60,22 @@ pub enum HubOutput {
     ToVehicle(String, ToVehicle),
     /// Hand these bytes to a vehicle on the coordination plane.
     Deliver(String, Arc<[u8]>),
-    /// Say this to mission-control.
-    ToControl(FromFleet),
+    /// Say this to mission-control, or to an operator.
+    ToControl {
+        /// To whom.
+        who: String,
+        /// What.
+        message: FromFleet,
+    },
     /// Open a log for this mission.
-    OpenLog(Opened),
+    OpenLog {
+        /// The mission.
+        mission: Opened,
+        /// Whether the flight begins: what an earlier flight of the same mission left is set aside.
+        fresh: bool,
+    },
+    /// Everything is collected: a process that was started for one flight may end.
+    Dismissed,
     /// Record this row.
     Record(Row),
     /// The flight is over: close the log.
@@ -88,6 +111,8 @@ impl PartialEq for Opened {
 pub struct Hub {
     vehicles: BTreeMap<String, Known>,
     load: Option<Load>,
+    /// Who asked for what is being answered.
+    asker: Option<String>,
     outputs: VecDeque<HubOutput>,
 }
 
@@ -120,7 +145,7 @@ impl Default for Hub {
 impl Hub {
     /// A hub that knows nothing yet.
     pub fn new() -> Hub {
-        Hub { vehicles: BTreeMap::new(), load: None, outputs: VecDeque::new() }
+        Hub { vehicles: BTreeMap::new(), load: None, asker: None, outputs: VecDeque::new() }
     }
 
     /// Where the fleet is in its life.
@@ -146,8 +171,15 @@ impl Hub {
         self.outputs.push_back(HubOutput::ToVehicle(id.to_string(), message));
     }
 
+    /// Answers whoever asked, if anyone did.
+    fn answer(&mut self, message: FromFleet) {
+        if let Some(who) = self.asker.clone() {
+            self.outputs.push_back(HubOutput::ToControl { who, message });
+        }
+    }
+
     fn refuse(&mut self, reason: String) {
-        self.outputs.push_back(HubOutput::ToControl(FromFleet::Refused { reason }));
+        self.answer(FromFleet::Refused { reason });
     }
 
     /// Ids of the mission's vehicles that are connected, in the mission's order.
@@ -172,6 +204,13 @@ impl Hub {
             ToFleet::Start { pace } => self.start(pace),
             ToFleet::Speed { speed } => self.speed(now, speed),
             ToFleet::Stop => self.stop(now, "stopped by mission-control"),
+            ToFleet::Dismiss => {
+                let ids: Vec<String> = self.vehicles.iter().filter(|(_, k)| k.connected).map(|(id, _)| id.clone()).collect();
+                for id in ids {
+                    self.to_vehicle(&id, ToVehicle::Dismiss);
+                }
+                self.outputs.push_back(HubOutput::Dismissed);
+            }
             ToFleet::SendLog { who, digest, file, offset } if who == HUB => {
                 self.outputs.push_back(HubOutput::ReadLog { digest, file, offset });
             }
@@ -222,7 +261,7 @@ impl Hub {
             vehicles,
             messages: self.totals(),
         };
-        self.outputs.push_back(HubOutput::ToControl(FromFleet::Status(status)));
+        self.answer(FromFleet::Status(status));
     }
 
     fn upload(&mut self, now: Time, text: &str) {
@@ -312,7 +351,7 @@ impl Hub {
             Some(lockstep) => lockstep.speeds.push(command),
             None => self.to_fleet(&ToVehicle::Speed(command)),
         }
-        self.outputs.push_back(HubOutput::ToControl(FromFleet::SpeedTaken { at, speed }));
+        self.answer(FromFleet::SpeedTaken { at, speed });
     }
 
     fn stop(&mut self, now: Time, why: &str) {
@@ -332,6 +371,12 @@ impl Hub {
         self.to_fleet(&ToVehicle::Stop);
         self.say(format!("flight ended: {why}"));
         self.status(now);
+    }
+
+    /// A piece of a log goes to mission-control, the only one who collects.
+    fn collected(&mut self, from: &str, piece: LogPiece) {
+        let message = FromFleet::Log { who: from.to_string(), piece };
+        self.outputs.push_back(HubOutput::ToControl { who: COLLECTOR.to_string(), message });
     }
 
     fn note(&mut self, now: Time, text: &str) {
@@ -389,7 +434,7 @@ impl Hub {
                 }
             }
             FromVehicle::Log(piece) => {
-                self.outputs.push_back(HubOutput::ToControl(FromFleet::Log { who: id.to_string(), piece }));
+                self.collected(id, piece);
             }
         }
     }
@@ -477,7 +522,8 @@ impl Hub {
         load.clock = Some(clock);
         load.emulator = Emulator::new(load.mission.clone(), real);
         load.lockstep = (!real).then(|| Lockstep::new(&load.mission));
-        self.outputs.push_back(HubOutput::OpenLog(Opened(load.mission.clone())));
+        let (mission, fresh) = (Opened(load.mission.clone()), !load.adopted);
+        self.outputs.push_back(HubOutput::OpenLog { mission, fresh });
         if load.adopted {
             load.emulator.skip_to(now);
             while load.emulator.poll_output().is_some() {}
@@ -581,10 +627,15 @@ impl Machine for Hub {
             Some(HubInput::Joined(id)) => self.joined(id),
             Some(HubInput::Left(id)) => self.left(now, &id),
             Some(HubInput::FromVehicle(id, message)) => self.from_vehicle(now, &id, message),
-            Some(HubInput::FromControl(message)) => self.from_control(now, message),
+            Some(HubInput::FromControl { who, message }) => {
+                self.asker = Some(who);
+                self.from_control(now, message);
+                self.asker = None;
+            }
+            Some(HubInput::LogFailed(reason)) => self.stop(now, &reason),
             Some(HubInput::ClockStarted(clock)) => self.clock_started(now, clock),
             Some(HubInput::Log(piece)) => {
-                self.outputs.push_back(HubOutput::ToControl(FromFleet::Log { who: HUB.into(), piece }));
+                self.collected(HUB, piece);
             }
             Some(HubInput::State(id, bytes)) => {
                 if let Some(load) = self.load.as_mut().filter(|l| l.phase == Phase::Running && l.lockstep.is_none())

@@ -6,3 +6,4 @@ pub mod emulator;
 pub mod hub;
 pub mod ledger;
 mod lockstep;
+pub mod program;

@@ -5,3 +5,4 @@
 pub mod flight;
 pub mod neighbours;
 pub mod node;
+pub mod program;

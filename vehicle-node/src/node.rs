@@ -26,11 +26,15 @@ pub enum NodeInput {
     Message(ToVehicle),
     /// Bytes came from the air.
     Heard(Vec<u8>),
-    /// The driver has started the clock; `last` is what an earlier process of this vehicle recorded of this mission.
-    ClockStarted {
-        /// Its last recorded state, if there is one.
+    /// The driver has started the clock.
+    ClockStarted,
+    /// The log is open; `last` is the last state that an earlier process of this vehicle recorded in this flight.
+    LogOpened {
+        /// That state, if there is one.
         last: Option<Box<StateRow>>,
     },
+    /// The log could not be opened, and why.
+    LogFailed(String),
     /// A piece of the log, as asked for.
     Log(LogPiece),
 }
@@ -42,8 +46,15 @@ pub enum NodeOutput {
     Send(FromVehicle),
     /// Put these bytes on the air.
     Transmit(Vec<u8>),
-    /// Open a log for the armed mission.
-    OpenLog(Opened),
+    /// Open a log for this mission and answer with [`NodeInput::LogOpened`].
+    OpenLog {
+        /// The mission.
+        mission: Opened,
+        /// Whether the flight begins: what an earlier flight of the same mission left is set aside.
+        fresh: bool,
+    },
+    /// Everything is collected: a process that was started for one flight may end.
+    Dismissed,
     /// Record this row.
     Record(Row),
     /// The flight is over: close the log.
@@ -114,6 +125,7 @@ impl VehicleNode {
             ToVehicle::Start { digest, clock, speeds } => self.start(digest, clock, speeds),
             ToVehicle::Speed(command) => self.speed(command),
             ToVehicle::Stop => self.stop(),
+            ToVehicle::Dismiss => self.outputs.push_back(NodeOutput::Dismissed),
             ToVehicle::Grant { until, heard, speeds } => self.grant(until, heard, speeds),
             ToVehicle::SendLog { digest, file, offset } => {
                 self.outputs.push_back(NodeOutput::ReadLog { digest, file, offset });
@@ -160,28 +172,34 @@ impl VehicleNode {
         }
         load.clock = Some(clock);
         load.speeds = speeds;
-        self.outputs.push_back(NodeOutput::OpenLog(Opened(load.mission.clone())));
         match clock {
             ClockPlan::Real { .. } => self.outputs.push_back(NodeOutput::FollowClock(clock)),
-            ClockPlan::Stepped => match Flight::new(load.mission.clone(), load.me, false) {
-                Ok(flight) => {
-                    load.flight = Some(flight);
-                    self.phase = Phase::Running;
-                }
-                Err(reason) => self.abort(reason),
-            },
+            ClockPlan::Stepped => self.open_log(true),
         }
     }
 
-    /// The clock runs: begin, or join the others where this vehicle should be by now.
-    fn clock_started(&mut self, now: Time, last: Option<&StateRow>) {
+    fn open_log(&mut self, fresh: bool) {
+        if let Some(load) = &self.load {
+            let mission = Opened(load.mission.clone());
+            self.outputs.push_back(NodeOutput::OpenLog { mission, fresh });
+        }
+    }
+
+    /// Whether the flight began without this vehicle.
+    fn is_late(&self, now: Time) -> bool {
+        self.load.as_ref().is_some_and(|load| now > Time::ZERO + load.mission.control_period * load.mission.message_ticks)
+    }
+
+    /// The log is open: begin, or join the others where this vehicle should be by now.
+    fn take_off(&mut self, now: Time, last: Option<&StateRow>) {
+        let late = self.is_late(now);
         let Some(load) = self.load.as_mut().filter(|_| self.phase == Phase::Armed) else { return };
-        let late = now > Time::ZERO + load.mission.control_period * load.mission.message_ticks;
         let flight = if late {
             let start = rejoin_at(&load.mission, load.me, &load.speeds, now, last);
             Flight::rejoin(load.mission.clone(), load.me, start, now)
         } else {
-            Flight::new(load.mission.clone(), load.me, true)
+            let real = load.clock.is_some_and(|clock| clock != ClockPlan::Stepped);
+            Flight::new(load.mission.clone(), load.me, real)
         };
         match flight {
             Ok(mut flight) => {
@@ -315,7 +333,12 @@ impl Machine for VehicleNode {
                 }
             }
             Some(NodeInput::Message(message)) => self.message(message),
-            Some(NodeInput::ClockStarted { last }) => self.clock_started(now, last.as_deref()),
+            Some(NodeInput::ClockStarted) => {
+                let fresh = !self.is_late(now);
+                self.open_log(fresh);
+            }
+            Some(NodeInput::LogOpened { last }) => self.take_off(now, last.as_deref()),
+            Some(NodeInput::LogFailed(reason)) => self.abort(reason),
             Some(NodeInput::Log(piece)) => self.send(FromVehicle::Log(piece)),
             Some(NodeInput::Heard(bytes)) => {
                 if let Some(flight) = self.load.as_mut().and_then(|load| load.flight.as_mut()) {

@@ -5,7 +5,9 @@
 //! |---|---|---|---|---|
 //! | kinematic | kinematic unicycle | line of sight (1.4) | rate | [`kinematic`] |
 //! | robot | dynamic unicycle (3.12) | Proposition 3.1 | acceleration (3.39), or rate (4.21) | [`robot`] |
+//! | underactuated body in space | 6-DOF (4.44), (4.45) | Theorem 4.7 | rate | [`auv`] |
 
+pub mod auv;
 pub mod kinematic;
 pub mod robot;
 
@@ -57,6 +59,3 @@ pub trait Craft: Send {
     fn is_sound(&self) -> bool;
 }
 
-pub mod auv;
-pub mod kinematic;
-pub mod robot;

@@ -230,7 +230,7 @@ fn check_ids(faults: &mut Collector<'_>, vehicles: &[VehicleSection]) -> HashMap
     for (i, vehicle) in vehicles.iter().enumerate() {
         let key = format!("vehicles[{i}].id");
         check_name(faults, &key, &vehicle.id);
-        if vehicle.id == "mission-control" || vehicle.id == "network-emulator" {
+        if ["mission-control", "network-emulator", "operator"].contains(&vehicle.id.as_str()) {
             faults.fault(&key, format!("{:?}", vehicle.id), "a name that is not one of the programs'");
         }
         if let Some(first) = ids.insert(vehicle.id.clone(), i) {

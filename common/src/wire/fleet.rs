@@ -39,6 +39,8 @@ pub enum ToFleet {
     },
     /// End the flight now.
     Stop,
+    /// Everything is collected: processes that were started for one flight may end.
+    Dismiss,
     /// Send a piece of a participant's log.
     SendLog {
         /// A vehicle's id, or `network-emulator`.

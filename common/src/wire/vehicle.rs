@@ -83,6 +83,8 @@ pub enum ToVehicle {
     Speed(SpeedCommand),
     /// End the flight now.
     Stop,
+    /// Everything is collected: a process that was started for one flight may end.
+    Dismiss,
     /// Stepped clock: run every control period up to `until`.
     Grant {
         /// Last instant to run.

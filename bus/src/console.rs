@@ -1,0 +1,55 @@
+//! What a program says to the person at its terminal, and what that person can say to it with a signal.
+
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use tracing_subscriber::EnvFilter;
+
+/// Log lines go to stderr, `info` and above (`RUST_LOG` changes that), with colour on a terminal only.
+pub fn init_log() {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_target(false)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .try_init();
+}
+
+/// Whether the process was asked to end.
+#[derive(Clone, Debug, Default)]
+pub struct StopFlag(Arc<AtomicBool>);
+
+impl StopFlag {
+    /// A flag for SIGINT and SIGTERM, which end the process at once until [`arm`](StopFlag::arm) is called. (The first
+    /// process of a container has no default for them.)
+    pub fn on_signals() -> StopFlag {
+        let flag = StopFlag(Arc::new(AtomicBool::new(true)));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            // In this order: the second signal finds the flag raised by the first.
+            let exit = signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&flag.0));
+            if let Err(error) = exit.and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag.0))) {
+                tracing::debug!("signal {signal} keeps its default: {error}");
+            }
+        }
+        flag
+    }
+
+    /// From now on the first signal raises the flag, and only a second one ends the process at once.
+    pub fn arm(&self) {
+        self.0.store(false, Ordering::Relaxed);
+    }
+
+    /// Whether it was raised.
+    pub fn is_raised(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// The host's name as a vehicle's name: lower case, and a dash for what may not be in one.
+pub fn host_name() -> String {
+    let uname = rustix::system::uname();
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
+    uname.nodename().to_string_lossy().chars().map(plain).take(32).collect()
+}

@@ -1,0 +1,211 @@
+//! The emulator as a program: what it does for its machine. The only file of this crate that knows there is a network.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use bus::Plane;
+use bus::console::StopFlag;
+use bus::drive::{Clock, Next, Port, drive};
+use bus::logs::Logs;
+use bus::setup::Endpoint;
+use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
+use clap::Parser;
+use common::wire::fleet::{Pace, ToFleet};
+use common::wire::vehicle::{ClockPlan, FromVehicle};
+use common::wire::{self, Garbage, GarbageCount};
+
+use crate::hub::{COLLECTOR, HUB, Hub, HubInput, HubOutput, OPERATOR};
+
+/// From the command to start until mission time zero: long enough for every vehicle to hear of it.
+const START_LEAD: Duration = Duration::from_millis(500);
+
+/// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
+///
+/// Every vehicle and mission-control connects here; no broker is needed beside it. It prints the endpoint it listens on
+/// as the first line of its output.
+///
+/// Exit codes: 0 ended as asked, 2 wrong use, 3 cannot listen, 4 recording failed.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "network-emulator", version)]
+pub struct Args {
+    /// Where vehicles and mission-control connect; port 0 takes a free one
+    #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_LISTEN")]
+    pub listen: Endpoint,
+    /// Folder for the emulator's logs
+    #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
+    pub logs: PathBuf,
+    /// End when mission-control has collected the logs of a flight
+    #[arg(long)]
+    pub once: bool,
+}
+
+/// Runs the program to its end.
+pub fn run(args: Args) -> ExitCode {
+    let (switchboard, events) = match Switchboard::open(SwitchboardConfig::new(args.listen)) {
+        Ok(open) => open,
+        Err(error) => {
+            tracing::error!("{error}");
+            return ExitCode::from(3);
+        }
+    };
+    let stop = StopFlag::on_signals();
+    stop.arm();
+    println!("{}", switchboard.endpoint());
+    let _ = std::io::stdout().flush();
+    tracing::info!("network-emulator listens on {}", switchboard.endpoint());
+    let mut port = HubPort {
+        switchboard,
+        logs: Logs::new(&args.logs, HUB),
+        lines: BTreeMap::new(),
+        ids: BTreeMap::new(),
+        garbage: BTreeMap::new(),
+        stop,
+        once: args.once,
+        recording_failed: None,
+    };
+    let exit = drive(&mut Hub::new(), &mut port, &mut Clock::Stopped, &events);
+    port.logs.close();
+    port.switchboard.close();
+    exit
+}
+
+struct HubPort {
+    switchboard: Switchboard,
+    logs: Logs,
+    lines: BTreeMap<String, LineId>,
+    ids: BTreeMap<LineId, String>,
+    /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
+    garbage: BTreeMap<LineId, GarbageCount>,
+    stop: StopFlag,
+    once: bool,
+    /// Why recording failed; the flight is stopped at the next opportunity.
+    recording_failed: Option<String>,
+}
+
+fn is_control(id: &str) -> bool {
+    id == COLLECTOR || id == OPERATOR
+}
+
+impl HubPort {
+    fn send(&self, id: &str, plane: Plane, bytes: &[u8]) {
+        if let Some(line) = self.lines.get(id)
+            && let Err(error) = self.switchboard.send(*line, plane, bytes)
+        {
+            tracing::debug!("not sent to {id}: {error}");
+        }
+    }
+
+    fn ignore(&mut self, line: LineId, kind: Garbage) {
+        if self.garbage.entry(line).or_default().count(kind) {
+            let id = self.ids.get(&line).map_or("?", String::as_str);
+            tracing::warn!("ignored a message of {id} on the mission plane: {}", kind.as_str());
+        }
+    }
+
+    fn exit_code(&self) -> ExitCode {
+        if self.recording_failed.is_some() { ExitCode::from(4) } else { ExitCode::SUCCESS }
+    }
+}
+
+impl Port for HubPort {
+    type Machine = Hub;
+    type Event = HubEvent;
+    type Exit = ExitCode;
+
+    fn translate(&mut self, event: HubEvent) -> Option<(Option<Instant>, HubInput)> {
+        match event {
+            HubEvent::Joined { line, id } => {
+                self.lines.insert(id.clone(), line);
+                self.ids.insert(line, id.clone());
+                if is_control(&id) {
+                    return None;
+                }
+                tracing::info!("{id} joined");
+                Some((None, HubInput::Joined(id)))
+            }
+            HubEvent::Left { line } => {
+                let id = self.ids.get(&line)?.clone();
+                if is_control(&id) {
+                    return None;
+                }
+                tracing::warn!("{id} left");
+                Some((None, HubInput::Left(id)))
+            }
+            HubEvent::Packet { line, plane: Plane::State, at, bytes } => {
+                let id = self.ids.get(&line)?.clone();
+                (!is_control(&id)).then_some((Some(at), HubInput::State(id, bytes)))
+            }
+            HubEvent::Packet { line, plane: Plane::Mission, bytes, .. } => {
+                let id = self.ids.get(&line)?.clone();
+                let input = if is_control(&id) {
+                    wire::decode::<ToFleet>(&bytes).map(|message| HubInput::FromControl { who: id, message })
+                } else {
+                    wire::decode::<FromVehicle>(&bytes).map(|message| HubInput::FromVehicle(id, message))
+                };
+                match input {
+                    Ok(input) => Some((None, input)),
+                    Err(kind) => {
+                        self.ignore(line, kind);
+                        None
+                    }
+                }
+            }
+        }
+    }
+
+    fn perform(&mut self, output: HubOutput, clock: &mut Clock) -> Next<Self> {
+        match output {
+            HubOutput::ToVehicle(id, message) => self.send(&id, Plane::Mission, &wire::encode(&message)),
+            HubOutput::Deliver(id, bytes) => self.send(&id, Plane::State, &bytes),
+            HubOutput::ToControl { who, message } => self.send(&who, Plane::Mission, &wire::encode(&message)),
+            HubOutput::Record(row) => self.logs.write(row),
+            HubOutput::CloseLog => self.logs.close(),
+            HubOutput::Say(text) => tracing::info!("{text}"),
+            HubOutput::OpenLog { mission, fresh } => {
+                if let Err(reason) = self.logs.open(&mission.0, fresh) {
+                    tracing::error!("{reason}");
+                    self.recording_failed = Some(reason.clone());
+                    return Next::Feed(HubInput::LogFailed(reason));
+                }
+            }
+            HubOutput::StartClock(pace) => {
+                let plan = match pace {
+                    Pace::Stepped => ClockPlan::Stepped,
+                    Pace::Real { speed_up } => Clock::plan(START_LEAD, speed_up),
+                };
+                *clock = Clock::follow(plan);
+                return Next::Feed(HubInput::ClockStarted(plan));
+            }
+            HubOutput::FollowClock(plan) => {
+                *clock = Clock::follow(plan);
+                return Next::Feed(HubInput::ClockStarted(plan));
+            }
+            HubOutput::ReadLog { digest, file, offset } => {
+                return Next::Feed(HubInput::Log(self.logs.piece(digest, file, offset)));
+            }
+            HubOutput::Dismissed if self.once => return Next::Exit(self.exit_code()),
+            HubOutput::Dismissed => {}
+        }
+        Next::Go
+    }
+
+    fn tend(&mut self, _hub: &Hub) -> Next<Self> {
+        if let Some(failure) = self.logs.take_failure() {
+            tracing::error!("{failure}; the network goes on without it");
+            self.recording_failed = Some(failure);
+        }
+        if self.stop.is_raised() {
+            tracing::info!("ended by signal");
+            return Next::Exit(self.exit_code());
+        }
+        Next::Go
+    }
+
+    fn closed(&mut self) -> ExitCode {
+        tracing::error!("the switchboard is closed");
+        ExitCode::from(3)
+    }
+}

@@ -1,0 +1,192 @@
+//! The vehicle as a program: what it does for its machine. The only file of this crate that knows there is a network.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use bus::console::StopFlag;
+use bus::drive::{Clock, Next, Port, drive};
+use bus::line::{Line, LineConfig, LineEvent};
+use bus::logs::Logs;
+use bus::setup::Endpoint;
+use bus::{Plane, Refusal};
+use clap::Parser;
+use common::wire::vehicle::{Phase, ToVehicle};
+use common::wire::{self, GarbageCount};
+
+use crate::node::{NodeInput, NodeOutput, VehicleNode};
+
+/// One vehicle of a fleet: simulates its body, follows its path, and coordinates with the others by sending nothing but
+/// its coordination state.
+///
+/// It starts knowing only its name. It waits for the network-emulator, gets its mission from mission-control through it,
+/// flies, keeps its log, and waits for the next mission. It goes on flying when the network or mission-control is lost.
+///
+/// Exit codes: 0 ended as asked, 2 wrong use, 3 no way to the network-emulator, 4 recording failed.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "vehicle-node", version, after_help = "Example, one terminal each:\n  \
+    network-emulator\n  vehicle-node --id auv1\n  vehicle-node --id auv2\n  vehicle-node --id auv3\n  \
+    mission-control run missions/auv-helix.toml --attach")]
+pub struct Args {
+    /// The vehicle's name in the mission file [default: the host's name]
+    #[arg(long, env = "CPF_ID")]
+    pub id: Option<String>,
+    /// The network-emulator to connect to
+    #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_CONNECT")]
+    pub connect: Endpoint,
+    /// Folder for the logs of this vehicle
+    #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
+    pub logs: PathBuf,
+    /// Give up when the network-emulator has not been found for this long [s] [default: never]
+    #[arg(long, value_name = "SECONDS")]
+    pub patience: Option<f64>,
+    /// End when mission-control has collected the log of a flight
+    #[arg(long)]
+    pub once: bool,
+}
+
+/// Runs the program to its end.
+pub fn run(args: Args) -> ExitCode {
+    let id = args.id.unwrap_or_else(bus::console::host_name);
+    let stop = StopFlag::on_signals();
+    let mut config = LineConfig::new(args.connect, id.as_str());
+    config.patience = args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64);
+    let (line, events) = match Line::connect(config) {
+        Ok(line) => line,
+        Err(error) => {
+            tracing::error!("{id}: {error}");
+            return ExitCode::from(3);
+        }
+    };
+    stop.arm();
+    let mut port = VehiclePort {
+        logs: Logs::new(&args.logs, &id),
+        id,
+        line,
+        stop,
+        once: args.once,
+        garbage: GarbageCount::default(),
+        refused: None,
+        recording_failed: false,
+    };
+    let exit = fly(&mut port, &events);
+    port.logs.close();
+    port.line.close();
+    exit
+}
+
+fn fly(port: &mut VehiclePort, events: &Receiver<LineEvent>) -> ExitCode {
+    let mut node = VehicleNode::new(&port.id);
+    drive(&mut node, port, &mut Clock::Stopped, events)
+}
+
+struct VehiclePort {
+    id: String,
+    line: Line,
+    logs: Logs,
+    stop: StopFlag,
+    once: bool,
+    garbage: GarbageCount,
+    refused: Option<Refusal>,
+    recording_failed: bool,
+}
+
+impl VehiclePort {
+    fn exit_code(&self) -> ExitCode {
+        if self.recording_failed { ExitCode::from(4) } else { ExitCode::SUCCESS }
+    }
+
+    fn send(&self, plane: Plane, bytes: &[u8]) {
+        // While the line is down there is nobody to tell; the flight goes on, and the line says when it is back.
+        if let Err(error) = self.line.send(plane, bytes) {
+            tracing::debug!("{}: not sent: {error}", self.id);
+        }
+    }
+}
+
+impl Port for VehiclePort {
+    type Machine = VehicleNode;
+    type Event = LineEvent;
+    type Exit = ExitCode;
+
+    fn translate(&mut self, event: LineEvent) -> Option<(Option<Instant>, NodeInput)> {
+        match event {
+            LineEvent::Connected => {
+                tracing::info!("{}: connected", self.id);
+                Some((None, NodeInput::Connected))
+            }
+            LineEvent::Lost => {
+                tracing::warn!("{}: lost the network-emulator; looking for it", self.id);
+                Some((None, NodeInput::Lost))
+            }
+            LineEvent::Refused(refusal) => {
+                self.refused = Some(refusal);
+                None
+            }
+            LineEvent::Packet { plane: Plane::State, at, bytes } => Some((Some(at), NodeInput::Heard(bytes))),
+            LineEvent::Packet { plane: Plane::Mission, bytes, .. } => match wire::decode::<ToVehicle>(&bytes) {
+                Ok(message) => Some((None, NodeInput::Message(message))),
+                Err(kind) => {
+                    if self.garbage.count(kind) {
+                        tracing::warn!("{}: ignored a message on the mission plane: {}", self.id, kind.as_str());
+                    }
+                    None
+                }
+            },
+        }
+    }
+
+    fn perform(&mut self, output: NodeOutput, clock: &mut Clock) -> Next<Self> {
+        match output {
+            NodeOutput::Send(message) => self.send(Plane::Mission, &wire::encode(&message)),
+            NodeOutput::Transmit(bytes) => self.send(Plane::State, &bytes),
+            NodeOutput::Record(row) => self.logs.write(row),
+            NodeOutput::CloseLog => self.logs.close(),
+            NodeOutput::Say(text) => tracing::info!("{}: {text}", self.id),
+            NodeOutput::FollowClock(plan) => {
+                *clock = Clock::follow(plan);
+                return Next::Feed(NodeInput::ClockStarted);
+            }
+            NodeOutput::OpenLog { mission, fresh } => {
+                return Next::Feed(match self.logs.open(&mission.0, fresh) {
+                    Ok(last) => NodeInput::LogOpened { last: last.map(Box::new) },
+                    Err(reason) => {
+                        tracing::error!("{}: {reason}", self.id);
+                        self.recording_failed = true;
+                        NodeInput::LogFailed(reason)
+                    }
+                });
+            }
+            NodeOutput::ReadLog { digest, file, offset } => {
+                return Next::Feed(NodeInput::Log(self.logs.piece(digest, file, offset)));
+            }
+            NodeOutput::Dismissed if self.once => return Next::Exit(self.exit_code()),
+            NodeOutput::Dismissed => {}
+        }
+        Next::Go
+    }
+
+    fn tend(&mut self, node: &VehicleNode) -> Next<Self> {
+        if let Some(failure) = self.logs.take_failure() {
+            // A vehicle under way is worth more than its log.
+            let on = if node.phase() == Phase::Running { "; the flight goes on without it" } else { "" };
+            tracing::error!("{}: {failure}{on}", self.id);
+            self.recording_failed = true;
+        }
+        if let Some(refusal) = self.refused.take() {
+            tracing::error!("{}: {refusal}", self.id);
+            return Next::Exit(ExitCode::from(3));
+        }
+        if self.stop.is_raised() {
+            tracing::info!("{}: ended by signal", self.id);
+            return Next::Exit(self.exit_code());
+        }
+        Next::Go
+    }
+
+    fn closed(&mut self) -> ExitCode {
+        tracing::error!("{}: the line is closed", self.id);
+        ExitCode::from(3)
+    }
+}
