@@ -1,5 +1,151 @@
-//! stub
-/// a
-pub struct Account;
-/// x
-pub fn write_run_folder() {}
+//! The files of a run folder that are made from its recording.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use bus::recording::Recording;
+use serde::Serialize;
+
+use super::{Facts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
+
+/// What the caller has to tell in the report besides numbers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Account {
+    /// Warnings of the mission check, how the run was made, and the like.
+    pub notes: Vec<String>,
+    /// Commands that make the run again.
+    pub reproduce: Vec<String>,
+}
+
+/// Writes `summary.json`, `clock.json`, `figures/*.svg` and `report.html` into a run folder. Each file appears whole
+/// or not at all, and replaces an earlier one, so that a report can be made again at any time. `theory` is asked for
+/// its table once the measured numbers are known. A failure names the file.
+pub fn write_run_folder(
+    directory: impl AsRef<Path>,
+    recording: &Recording,
+    facts: &Facts,
+    theory: impl FnOnce(&Summary) -> Vec<TheoryRow>,
+    account: &Account,
+) -> io::Result<Summary> {
+    let directory = directory.as_ref();
+    let (summary, clock) = (summarise(recording, facts), summarise_clock(recording));
+    let figures = figures(recording, facts);
+    let page = report(&Report {
+        facts,
+        summary: &summary,
+        clock: &clock,
+        figures: &figures,
+        theory: &theory(&summary),
+        notes: &account.notes,
+        reproduce: &account.reproduce,
+        mission_toml: &recording.mission_toml,
+    });
+    let drawings = directory.join("figures");
+    fs::create_dir_all(&drawings).map_err(|cause| named(&drawings, &cause))?;
+    for figure in &figures {
+        write(&drawings.join(figure.name).with_extension("svg"), figure.svg.as_bytes())?;
+    }
+    write(&directory.join("summary.json"), &json(&summary)?)?;
+    write(&directory.join("clock.json"), &json(&clock)?)?;
+    write(&directory.join("report.html"), page.as_bytes())?;
+    Ok(summary)
+}
+
+fn json(value: &impl Serialize) -> io::Result<Vec<u8>> {
+    let mut text = serde_json::to_vec_pretty(value)?;
+    text.push(b'\n');
+    Ok(text)
+}
+
+/// Writes a file beside its place and moves it there.
+fn write(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut name: OsString = path.file_name().unwrap_or_default().to_owned();
+    name.push(".part");
+    let temporary = path.with_file_name(name);
+    let written = fs::write(&temporary, content).and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|cause| {
+        // What is left of a failed attempt only takes the room that may be short.
+        let _ = fs::remove_file(&temporary);
+        named(path, &cause)
+    })
+}
+
+fn named(path: &Path, cause: &io::Error) -> io::Error {
+    io::Error::new(cause.kind(), format!("{}: {cause}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{facts, fleet};
+    use super::*;
+
+    fn theory(summary: &Summary) -> Vec<TheoryRow> {
+        let fitted = summary.fleet.coordination.fit.map_or(0.0, |fit| fit.rate);
+        vec![
+            TheoryRow {
+                name: "Theorem 4.3".into(),
+                condition: "brief connectivity losses: α = 0.75 < 1".into(),
+                holds: Some(true),
+                predicted: "rate ≥ 0.012 /s".into(),
+                measured: format!("{fitted:.4} /s"),
+            },
+            TheoryRow {
+                name: "Formation speed".into(),
+                condition: "delays are equal on all links, and the graph is balanced".into(),
+                holds: None,
+                predicted: "0.5 /s".into(),
+                measured: format!("{:.4} /s", summary.fleet.steady_speed),
+            },
+        ]
+    }
+
+    fn write_fleet(directory: &Path, spatial: bool) -> Summary {
+        let account = Account {
+            notes: vec!["simulated".into()],
+            reproduce: vec!["mission-control simulate mission.toml --seed 42".into()],
+        };
+        write_run_folder(directory, &fleet(spatial), &facts(spatial), theory, &account).expect("writes")
+    }
+
+    fn files(directory: &Path) -> Vec<(OsString, Vec<u8>)> {
+        let mut files: Vec<_> = fs::read_dir(directory)
+            .expect("lists")
+            .map(|entry| entry.expect("an entry"))
+            .filter(|entry| entry.path().is_file())
+            .map(|entry| (entry.file_name(), fs::read(entry.path()).expect("reads")))
+            .collect();
+        files.sort();
+        files
+    }
+
+    #[test]
+    fn the_folder_is_written_and_can_be_written_again() {
+        let directory = tempfile::tempdir().expect("directory");
+        write_fleet(directory.path(), true);
+        let first = files(directory.path());
+        let names: Vec<_> = first.iter().map(|(name, _)| name.to_string_lossy().into_owned()).collect();
+        assert_eq!(names, ["clock.json", "report.html", "summary.json"]);
+        assert_eq!(files(&directory.path().join("figures")).len(), 3);
+        write_fleet(directory.path(), true);
+        assert!(files(directory.path()) == first, "the same recording gives the same files");
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_is_named() {
+        let outcome = write_run_folder("/proc/nowhere", &fleet(true), &facts(true), theory, &Account::default());
+        let error = outcome.expect_err("refused").to_string();
+        assert!(error.contains("/proc/nowhere"), "{error}");
+    }
+
+    #[test]
+    #[ignore = "writes pictures for people to look at into the folder for temporary files"]
+    fn pictures() {
+        for (name, spatial) in [("planar", false), ("spatial", true)] {
+            let directory = std::env::temp_dir().join("cpf-pictures").join(name);
+            fs::create_dir_all(&directory).expect("creates");
+            write_fleet(&directory, spatial);
+        }
+    }
+}

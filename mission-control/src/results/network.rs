@@ -64,7 +64,7 @@ impl Spread {
 }
 
 /// Every directed link's messages and up times: the links of the mission first, then others that have rows.
-pub fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<LinkSummary> {
+pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<LinkSummary> {
     let mut messages: BTreeMap<(&str, &str), Vec<&MessageRow>> = BTreeMap::new();
     for record in exact {
         if let Record::Message(row) = record {
@@ -125,7 +125,7 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
 }
 
 /// Number of transmissions: a message to several receivers goes on the air once.
-pub fn transmissions(exact: &[Record]) -> u64 {
+pub(super) fn transmissions(exact: &[Record]) -> u64 {
     let mut sent: Vec<(&str, i64, u64)> = exact
         .iter()
         .filter_map(|record| match record {

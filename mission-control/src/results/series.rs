@@ -43,7 +43,7 @@ pub fn tracks<'a>(exact: &'a [Record], facts: &'a Facts) -> Vec<Track<'a>> {
 }
 
 /// The changes of the formation speed, in order of time.
-pub fn speeds(exact: &[Record]) -> Vec<&SpeedRow> {
+pub(super) fn speeds(exact: &[Record]) -> Vec<&SpeedRow> {
     let rows = exact.iter().filter_map(|record| match record {
         Record::Speed(row) => Some(row),
         _ => None,

@@ -28,7 +28,7 @@ pub fn settling_time(times: &[f64], values: &[f64], threshold: f64) -> Option<f6
 ///
 /// The part that is fitted begins when the series has come down to half of its peak (the transient is over), and ends
 /// when it has come down for good to three times its floor. The floor is what 90 % of the last tenth of the run stay
-/// below; there is none while the series still falls by half between its eighth tenth and its last. With a `period`
+/// below; there is none if the series still falls in the end, by 70 % of its mean slope or more. With a `period`
 /// (of the switching network, whose outages make the decay a staircase) the part is cut to whole periods. The slope
 /// of the logarithm is the median of the slopes between all pairs of about 200 evenly spaced samples (Theil and Sen),
 /// which steps, ripples and outliers move little.
@@ -38,10 +38,11 @@ pub fn fit_exponential(times: &[f64], norms: &[f64], period: Option<f64>) -> Opt
     let (times, norms) = (&times[..count], &norms[..count]);
     let peak = (0..count).max_by(|a, b| norms[*a].total_cmp(&norms[*b]))?;
     let begin = (peak..count).find(|index| norms[*index] <= norms[peak] / 2.0)?;
-    let tail = |from: usize, to: usize| sorted(&norms[count * from / 10..count * to / 10]);
-    let (eighth, last) = (tail(7, 8), tail(9, 10));
-    let still_falling = quantile(&last, 0.5)? < quantile(&eighth, 0.5)? / 2.0;
-    let floor = if still_falling { 0.0 } else { quantile(&last, 0.9)? };
+    let tenth = |number: usize| sorted(&norms[count * (number - 1) / 10..count * number / 10]);
+    let (ninth, last) = (quantile(&tenth(9), 0.5)?, quantile(&tenth(10), 0.5)?);
+    let tenths = 9.5 - 10.0 * begin as f64 / count as f64;
+    let still_falling = (ninth / last).ln() >= 0.7 * (norms[begin] / last).ln() / tenths.max(0.5);
+    let floor = if still_falling { 0.0 } else { quantile(&tenth(10), 0.9)? };
     let settled = settling_time(times, norms, 3.0 * floor).unwrap_or(f64::INFINITY);
     let from_s = times[begin];
     let mut to_s = times[count - 1].min(settled);
@@ -74,7 +75,7 @@ pub fn fit_exponential(times: &[f64], norms: &[f64], period: Option<f64>) -> Opt
 }
 
 /// Where the last fifth of a series begins, rounded to whole periods of the network if it has some.
-pub fn steady_from(end_s: f64, start_s: f64, period: Option<f64>) -> f64 {
+pub(super) fn steady_from(end_s: f64, start_s: f64, period: Option<f64>) -> f64 {
     let fifth = (end_s - start_s) / 5.0;
     let length = match period {
         Some(period) if period > 0.0 && period <= (end_s - start_s) / 2.0 => (fifth / period).floor().max(1.0) * period,
@@ -91,24 +92,24 @@ pub(super) fn sorted(values: &[f64]) -> Vec<f64> {
 }
 
 /// The value below which a part `q` of ascending values lies (nearest rank); `None` if there are none.
-pub fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
+pub(super) fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
     let rank = (q * ascending.len() as f64).ceil() as usize;
     ascending.get(rank.saturating_sub(1).min(ascending.len().saturating_sub(1))).copied()
 }
 
 /// Root of the mean square; 0 if there are no values.
-pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(super) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|value| value * value)).sqrt()
 }
 
 /// The mean; 0 if there are no values.
-pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
 /// The largest value; 0 if there are no values (for magnitudes, which are never negative).
-pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 
@@ -136,6 +137,20 @@ mod tests {
     fn a_floor_does_not_flatten_the_rate() {
         let rate = fitted(None, |t| 3.0 * (-0.2 * t).exp() + 1e-4 * (1.0 + (7.0 * t).sin()));
         assert!((rate - 0.2).abs() < 0.004, "{rate}");
+    }
+
+    #[test]
+    fn a_floor_that_is_reached_late_does_not_count() {
+        let (times, values) = series(|t| 10.0 * (-0.05 * t).exp() + 1e-3 * (1.5 + (0.9 * t).sin()));
+        let fit = fit_exponential(&times, &values, None).expect("decays");
+        assert!((fit.rate - 0.05).abs() < 0.001 && fit.to_s < 150.0, "{fit:?}");
+    }
+
+    #[test]
+    fn a_slow_decay_is_used_to_its_end() {
+        let (times, values) = series(|t| (-0.012 * t).exp());
+        let fit = fit_exponential(&times, &values, None).expect("decays");
+        assert!((fit.rate - 0.012).abs() < 1e-9 && fit.to_s > 199.0, "{fit:?}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The numbers of a run: `summary.json`, a function of mission and seed, and `clock.json`, of the machine too.
 
 use bus::recording::Recording;
-use common::record::{ClockRecord, SpeedRow};
+use common::record::ClockRecord;
 use serde::Serialize;
 
 use super::Facts;
@@ -10,11 +10,11 @@ use super::series::{Coordination, Track, speeds, tracks};
 use super::statistics::{ExponentialFit, fit_exponential, largest, mean, rms, settling_time, steady_from};
 
 /// A fleet counts as coordinated when its largest difference stays below this \[units of ξ\].
-pub const COORDINATION_THRESHOLD: f64 = 1e-2;
+pub(super) const COORDINATION_THRESHOLD: f64 = 1e-2;
 /// A vehicle counts as on its path when its path-following error stays below this \[m\].
-pub const PATH_THRESHOLD_M: f64 = 0.1;
+pub(super) const PATH_THRESHOLD_M: f64 = 0.1;
 /// Settling, without an absolute threshold, means to stay below this part of the largest value.
-pub const SETTLED_PART: f64 = 0.02;
+pub(super) const SETTLED_PART: f64 = 0.02;
 /// Time series in the summary have at most about this many samples.
 const SERIES_SAMPLES: usize = 600;
 
@@ -408,11 +408,6 @@ pub(super) fn thinned(count: usize, samples: usize) -> Vec<usize> {
         return (0..count).collect();
     }
     (0..samples).map(|step| step * (count - 1) / (samples - 1)).collect()
-}
-
-/// The last formation speed before or at `t_ns`.
-pub(super) fn formation_speed_at(speeds: &[&SpeedRow], t_ns: i64) -> Option<f64> {
-    speeds.iter().rev().find(|row| row.t_ns <= t_ns).map(|row| row.speed)
 }
 
 #[cfg(test)]
