@@ -110,6 +110,6 @@ print(count)
 "#;
     let ours = cpf_bus::recording::read(&cut).expect("reads");
     assert!(!ours.complete);
-    assert!(ours.exact.len() >= 100 && ours.exact.len() < 600 && ours.exact.len() % 100 == 0);
+    assert!(ours.exact.len() >= 100 && ours.exact.len() < 600 && ours.exact.len().is_multiple_of(100));
     assert_eq!(python(streamed, &cut), ours.exact.len().to_string());
 }

@@ -259,7 +259,7 @@ mod tests {
         let all = ticks(1000);
         let (of_a, of_others): (Vec<Row>, Vec<Row>) =
             all.iter().cloned().partition(|row| matches!(row, Row::Exact(common::record::Record::State(_))));
-        let (_one, first, merged_one) = merged(&[all.clone()], 3);
+        let (_one, first, merged_one) = merged(std::slice::from_ref(&all), 3);
         let (_two, second, _) = merged(&[of_a, of_others], 170);
         assert_eq!(merged_one.rows, 8000);
         let bytes = fs::read(first).expect("reads");

@@ -58,7 +58,7 @@ pub fn read_from(source: impl Read, place: impl Into<PathBuf>) -> Result<Recordi
 
 fn collect<R: Read>(mut rows: RowReader<R>) -> Result<Recording> {
     let mut recording = Recording::default();
-    while let Some(row) = rows.next() {
+    for row in rows.by_ref() {
         match row? {
             Row::Exact(record) => recording.exact.push(record),
             Row::Clock(record) => recording.clock.push(record),

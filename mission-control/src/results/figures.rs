@@ -142,7 +142,7 @@ impl Panel {
         ];
         let hidden = |corner: &(LegendPosition, f64, f64, f64, f64)| {
             let (_, left, right, bottom, top) = corner;
-            self.drawn.iter().filter(|(x, y)| (*left..=*right).contains(&x) && (*bottom..=*top).contains(&y)).count()
+            self.drawn.iter().filter(|(x, y)| (*left..=*right).contains(x) && (*bottom..=*top).contains(y)).count()
         };
         corners.iter().min_by_key(|corner| hidden(corner)).map_or(LegendPosition::InsideTopRight, |corner| corner.0)
     }
@@ -154,7 +154,7 @@ type Drawing = (Vec<Plot>, Layout);
 impl View<'_> {
     fn planar(&self) -> Vec<Figure> {
         let panels = vec![
-            self.from_above("(a) Trajectories"),
+            self.plan_view("(a) Trajectories"),
             self.over_time("(b) Speeds", "speed [m/s]", |row| row.speed_mps),
             self.coordination_errors("(c) Coordination errors"),
             self.over_time("(d) Cross-track errors", "cross-track error [m]", |row| row.e_cross_m),
@@ -165,7 +165,7 @@ impl View<'_> {
 
     fn spatial(&self) -> Vec<Figure> {
         let trajectories = vec![
-            self.from_above("(a) Trajectories from above"),
+            self.plan_view("(a) Trajectories from above"),
             self.over_time("(b) Third coordinate", "z [m]", |row| row.z_m),
         ];
         let errors = vec![
@@ -253,7 +253,7 @@ impl View<'_> {
         Some((self.facts.guaranteed_rate?, height)).filter(|_| height > 0.0)
     }
 
-    fn from_above(&self, title: &str) -> Drawing {
+    fn plan_view(&self, title: &str) -> Drawing {
         let mut panel = Panel::default();
         for vehicle in &self.facts.vehicles {
             let points = vehicle.planned.iter().map(|[x, y, _]| (*x, *y)).collect();

@@ -125,7 +125,7 @@ fn interpolate(rows: &[&StateRow], cursor: &mut usize, t_ns: i64, gap_ns: i64) -
     let before = rows.get(cursor.checked_sub(1)?)?;
     let span_ns = after.t_ns - before.t_ns;
     let part = (t_ns - before.t_ns) as f64 / span_ns as f64;
-    (span_ns <= gap_ns).then(|| before.xi + part * (after.xi - before.xi))
+    (span_ns <= gap_ns).then_some(before.xi + part * (after.xi - before.xi))
 }
 
 #[cfg(test)]

@@ -20,7 +20,8 @@ pub struct ExponentialFit {
 /// The first instant from which on `values` stay at or below `threshold`; `None` if the last one is above, or there
 /// is none.
 pub fn settling_time(times: &[f64], values: &[f64], threshold: f64) -> Option<f64> {
-    let next = values.iter().rposition(|value| !(value.abs() <= threshold)).map_or(0, |last| last + 1);
+    let outside = |value: &f64| value.is_nan() || value.abs() > threshold;
+    let next = values.iter().rposition(outside).map_or(0, |last| last + 1);
     times.get(next).copied()
 }
 
