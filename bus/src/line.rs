@@ -52,9 +52,9 @@ pub struct LineConfig {
 }
 
 impl LineConfig {
-    /// Waits for ever, with 65 536 waiting events.
+    /// Waits for ever, with 8 192 waiting events: there may be a hundred of these processes.
     pub fn new(endpoint: Endpoint, id: impl Into<String>) -> LineConfig {
-        LineConfig { endpoint, id: id.into(), patience: None, queue: 1 << 16 }
+        LineConfig { endpoint, id: id.into(), patience: None, queue: 1 << 13 }
     }
 }
 
@@ -161,7 +161,9 @@ impl Line {
 
 impl Drop for Line {
     fn drop(&mut self) {
-        if let Some(inbox) = self.shared.inbox().filter(|inbox| inbox.is_open()) {
+        if let Some(inbox) = self.shared.inbox().filter(|inbox| inbox.is_open())
+            && inbox.outbox.ask_to_acknowledge().is_ok()
+        {
             inbox.outbox.drain(Instant::now() + FAREWELL);
         }
         let _ = self.signals.send(Signal::Close);

@@ -127,11 +127,14 @@ impl Outbox {
         }
     }
 
-    /// Waits until the other end has taken all of the mission plane; false if it has not by the deadline.
+    /// Has the other end say what it has taken, once it has taken all that was sent before.
+    pub(crate) fn ask_to_acknowledge(&self) -> Result<()> {
+        self.send_frame(&Frame::AckNow)
+    }
+
+    /// Waits until the other end has taken all of the mission plane, as far as it was asked; false if it has not by
+    /// the deadline.
     pub(crate) fn drain(&self, deadline: Instant) -> bool {
-        if self.send_frame(&Frame::AckNow).is_err() {
-            return false;
-        }
         let mut queue = self.lock();
         while !(queue.backlog.is_empty() && queue.on_its_way() == 0) {
             let left = deadline.saturating_duration_since(Instant::now());

@@ -137,7 +137,7 @@ fn a_frozen_participant_holds_up_nobody_and_comes_back() {
         for _ in 0..100 {
             hub.send(frozen, Plane::State, &[i; 8 << 10]).expect("joined");
         }
-        match hub.send(frozen, Plane::Mission, &[i; 4 << 20]) {
+        match hub.send(frozen, Plane::Mission, &vec![i; 4 << 20]) {
             Ok(()) | Err(Error::Backlogged) => {}
             Err(other) => panic!("{other}"),
         }
@@ -152,16 +152,39 @@ fn a_frozen_participant_holds_up_nobody_and_comes_back() {
     assert_eq!(next(&hub_events), HubEvent::Left { line: frozen }, "the lease has ended");
 
     actor.signal(Signal::CONT);
-    let back = loop {
-        match next(&hub_events) {
-            HubEvent::Joined { line, .. } => break line,
-            HubEvent::Packet { .. } => panic!("a ghost's message was heard"),
-            HubEvent::Left { .. } => panic!("it had left"),
-        }
-    };
+    // And nothing before it: what the ghost had still to say is not heard.
+    let back = expect_joined(&hub_events, "auv1");
     assert_eq!(back, frozen);
     hub.send(frozen, Plane::Mission, b"welcome back").expect("joined");
     assert_eq!(expect_up(&hub_events, frozen), (Plane::Mission, b"welcome back".to_vec()));
+}
+
+#[test]
+fn a_frozen_hub_is_lost_and_found_again() {
+    let endpoint = free_endpoint();
+    let actor = Actor::start("lives::echoing_hub", &endpoint);
+    let (line, events) = line(&endpoint, "auv1");
+    actor.signal(Signal::STOP);
+    assert_eq!(next(&events), LineEvent::Lost);
+    actor.signal(Signal::CONT);
+    assert_eq!(next(&events), LineEvent::Connected);
+    line.send(Plane::Mission, b"again").expect("connected");
+    assert_eq!(expect_down(&events), (Plane::Mission, b"again".to_vec()));
+}
+
+#[test]
+fn a_line_that_the_next_hub_refuses_says_so_and_ends() {
+    let (first, _first_events) = hub();
+    let endpoint = first.endpoint().clone();
+    let (line, events) = line(&endpoint, "auv1");
+    first.close();
+    assert_eq!(next(&events), LineEvent::Lost);
+    let mut config = SwitchboardConfig::new(endpoint);
+    config.max_lines = 0;
+    let (_second, _second_events) = Switchboard::open(config).expect("the port is free again");
+    assert_eq!(next(&events), LineEvent::Refused(Refusal::Full { lines: 0 }));
+    assert_eq!(recv_until(&events, Some(Instant::now() + PATIENCE)), Wake::Closed);
+    assert_eq!(line.send(Plane::State, b"x"), Err(Error::NotConnected));
 }
 
 #[test]

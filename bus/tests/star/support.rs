@@ -40,6 +40,7 @@ pub(crate) fn hub() -> (Switchboard, Receiver<HubEvent>) {
 pub(crate) fn line(endpoint: &Endpoint, id: &str) -> (Line, Receiver<LineEvent>) {
     let mut config = LineConfig::new(endpoint.clone(), id);
     config.patience = Some(PATIENCE);
+    config.queue = 1 << 16;
     let (line, events) = Line::connect(config).expect("the line connects");
     assert_eq!(next(&events), LineEvent::Connected);
     (line, events)
