@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
-use crate::plane::{Frame, Plane, down_key, hub_token, join_key, participant_token, up_key};
+use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
 use crate::setup::{self, Endpoint, LEASE};
 
 /// How often a hub that is not there is looked for.
@@ -59,7 +59,7 @@ impl LineConfig {
 }
 
 /// What happens on a participant's line. Packets come only between `Connected` and `Lost`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub enum LineEvent {
     /// The hub answers; messages pass both ways. The first event is this one.
     Connected,
@@ -76,6 +76,19 @@ pub enum LineEvent {
         /// The message.
         bytes: Vec<u8>,
     },
+}
+
+impl fmt::Debug for LineEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LineEvent::Connected => f.write_str("Connected"),
+            LineEvent::Lost => f.write_str("Lost"),
+            LineEvent::Refused(refusal) => f.debug_tuple("Refused").field(refusal).finish(),
+            LineEvent::Packet { plane, bytes, .. } => {
+                f.debug_tuple("Packet").field(plane).field(&Size(bytes.len())).finish()
+            }
+        }
+    }
 }
 
 /// One participant's line to the hub.

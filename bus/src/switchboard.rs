@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
-use crate::plane::{Frame, Plane, down_key, hub_token, join_key, participant_token, up_key};
+use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
 use crate::setup::{self, Endpoint, LEASE};
 
 /// How long [`Switchboard::close`] waits for participants to take what was sent to them.
@@ -64,7 +64,7 @@ impl fmt::Display for LineId {
 }
 
 /// What happens on the hub's lines. A line's packets come after its `Joined` and before its `Left`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub enum HubEvent {
     /// A participant holds its line, and can be sent to.
     Joined {
@@ -89,6 +89,18 @@ pub enum HubEvent {
         /// The message.
         bytes: Vec<u8>,
     },
+}
+
+impl fmt::Debug for HubEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            HubEvent::Joined { line, id } => f.debug_struct("Joined").field("line", line).field("id", id).finish(),
+            HubEvent::Left { line } => f.debug_struct("Left").field("line", line).finish(),
+            HubEvent::Packet { line, plane, bytes, .. } => {
+                f.debug_tuple("Packet").field(line).field(plane).field(&Size(bytes.len())).finish()
+            }
+        }
+    }
 }
 
 /// The hub: all lines of the star end here.

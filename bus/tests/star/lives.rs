@@ -3,14 +3,12 @@
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
+use crate::support::*;
 use bus::clock::{Wake, recv_until};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, Switchboard, SwitchboardConfig};
 use bus::{Error, Plane, Refusal};
-use rustix::process::Signal;
-
-use crate::support::*;
 
 #[test]
 #[ignore = "a role: a participant that sends back what it gets"]
@@ -130,7 +128,7 @@ fn a_frozen_participant_holds_up_nobody_and_comes_back() {
     let actor = Actor::start("lives::echoing_participant", hub.endpoint());
     let frozen = expect_joined(&hub_events, "auv1");
     let (living, living_events, number) = joined(&hub, &hub_events, "auv2");
-    actor.signal(Signal::STOP);
+    actor.freeze();
 
     // More than the transport, the sockets and the backlog can hold.
     for i in 0..20u8 {
@@ -151,7 +149,7 @@ fn a_frozen_participant_holds_up_nobody_and_comes_back() {
     assert_eq!(hub.counts(frozen).expect("known").backlogged, 4, "of 80 MiB, 64 are kept");
     assert_eq!(next(&hub_events), HubEvent::Left { line: frozen }, "the lease has ended");
 
-    actor.signal(Signal::CONT);
+    actor.thaw();
     // And nothing before it: what the ghost had still to say is not heard.
     let back = expect_joined(&hub_events, "auv1");
     assert_eq!(back, frozen);
@@ -164,9 +162,9 @@ fn a_frozen_hub_is_lost_and_found_again() {
     let endpoint = free_endpoint();
     let actor = Actor::start("lives::echoing_hub", &endpoint);
     let (line, events) = line(&endpoint, "auv1");
-    actor.signal(Signal::STOP);
+    actor.freeze();
     assert_eq!(next(&events), LineEvent::Lost);
-    actor.signal(Signal::CONT);
+    actor.thaw();
     assert_eq!(next(&events), LineEvent::Connected);
     line.send(Plane::Mission, b"again").expect("connected");
     assert_eq!(expect_down(&events), (Plane::Mission, b"again".to_vec()));
