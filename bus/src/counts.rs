@@ -62,6 +62,10 @@ impl Counter {
     pub(crate) fn add_one(&self) -> u64 {
         self.0.fetch_add(1, Ordering::Relaxed) + 1
     }
+    /// Undoes one [`add_one`](Self::add_one).
+    pub(crate) fn take_back(&self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
     pub(crate) fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }

@@ -64,6 +64,11 @@ impl<E> Inbox<E> {
         self.lock().phase == Phase::Open
     }
 
+    /// Whether the two ends have not shaken hands yet.
+    pub(crate) fn is_waiting(&self) -> bool {
+        self.lock().phase == Phase::Waiting
+    }
+
     /// Opens the gate, announcing it by `event` and then doing `then` before anything else passes; false if the
     /// program's queue has no room for the event, or the line is closed.
     pub(crate) fn open(&self, event: E, then: impl FnOnce()) -> bool {
@@ -152,18 +157,19 @@ impl<E> Inbox<E> {
             Plane::State => (&self.tally.state_in, &self.tally.state_dropped),
             Plane::Mission => (&self.tally.mission_in, &self.tally.mission_dropped),
         };
+        // Before the program can see the message, so that it never finds a count behind what it holds.
+        delivered.add_one();
         match self.events.try_send((self.packet)(plane, at, bytes)) {
-            Ok(()) => {
-                delivered.add_one();
-            }
+            Ok(()) => {}
             Err(TrySendError::Full(_)) => {
+                delivered.take_back();
                 let so_far = dropped.add_one();
                 if plane == Plane::Mission && so_far.is_power_of_two() {
                     tracing::error!("the program does not empty its queue: {so_far} mission messages are lost");
                 }
             }
             // The program listens no more.
-            Err(TrySendError::Disconnected(_)) => {}
+            Err(TrySendError::Disconnected(_)) => delivered.take_back(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The bus: the only part of the project that names Zenoh or reads a wall clock.
 //!
 //! The network is a star. Its hub, the [`switchboard`], lives in the network-emulator; every participant (a vehicle, or
-//! mission-control) holds one [`line`] to it. A participant asks for its line in the hub's *lobby* and is given a port
+//! mission-control) holds one [`line`](mod@line) to it. A participant asks for its line in the hub's *lobby* and is given a port
 //! of its own, behind which is a Zenoh session of its own. Sessions are not linked, so nothing crosses from one line to
 //! another except what the hub's program sends on.
 //!

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
-use crate::plane::{Frame, Plane, down_key, hub_token, join_key, participant_token, up_key};
+use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
 use crate::setup::{self, Endpoint, LEASE};
 
 /// How often a hub that is not there is looked for.
@@ -52,14 +52,14 @@ pub struct LineConfig {
 }
 
 impl LineConfig {
-    /// Waits for ever, with 65 536 waiting events.
+    /// Waits for ever, with 8 192 waiting events: there may be a hundred of these processes.
     pub fn new(endpoint: Endpoint, id: impl Into<String>) -> LineConfig {
-        LineConfig { endpoint, id: id.into(), patience: None, queue: 1 << 16 }
+        LineConfig { endpoint, id: id.into(), patience: None, queue: 1 << 13 }
     }
 }
 
 /// What happens on a participant's line. Packets come only between `Connected` and `Lost`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub enum LineEvent {
     /// The hub answers; messages pass both ways. The first event is this one.
     Connected,
@@ -76,6 +76,19 @@ pub enum LineEvent {
         /// The message.
         bytes: Vec<u8>,
     },
+}
+
+impl fmt::Debug for LineEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LineEvent::Connected => f.write_str("Connected"),
+            LineEvent::Lost => f.write_str("Lost"),
+            LineEvent::Refused(refusal) => f.debug_tuple("Refused").field(refusal).finish(),
+            LineEvent::Packet { plane, bytes, .. } => {
+                f.debug_tuple("Packet").field(plane).field(&Size(bytes.len())).finish()
+            }
+        }
+    }
 }
 
 /// One participant's line to the hub.
@@ -161,7 +174,9 @@ impl Line {
 
 impl Drop for Line {
     fn drop(&mut self) {
-        if let Some(inbox) = self.shared.inbox().filter(|inbox| inbox.is_open()) {
+        if let Some(inbox) = self.shared.inbox().filter(|inbox| inbox.is_open())
+            && inbox.outbox.ask_to_acknowledge().is_ok()
+        {
             inbox.outbox.drain(Instant::now() + FAREWELL);
         }
         let _ = self.signals.send(Signal::Close);

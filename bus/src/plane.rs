@@ -41,6 +41,15 @@ impl fmt::Display for Plane {
     }
 }
 
+/// A message's size stands for its bytes wherever an event is printed: they may be millions.
+pub(crate) struct Size(pub(crate) usize);
+
+impl fmt::Debug for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} bytes", self.0)
+    }
+}
+
 /// Where participants ask to be let in.
 pub(crate) fn join_key(id: &str) -> String {
     format!("cpf/join/{id}")

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
-use crate::plane::{Frame, Plane, down_key, hub_token, join_key, participant_token, up_key};
+use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
 use crate::setup::{self, Endpoint, LEASE};
 
 /// How long [`Switchboard::close`] waits for participants to take what was sent to them.
@@ -64,7 +64,7 @@ impl fmt::Display for LineId {
 }
 
 /// What happens on the hub's lines. A line's packets come after its `Joined` and before its `Left`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub enum HubEvent {
     /// A participant holds its line, and can be sent to.
     Joined {
@@ -89,6 +89,18 @@ pub enum HubEvent {
         /// The message.
         bytes: Vec<u8>,
     },
+}
+
+impl fmt::Debug for HubEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            HubEvent::Joined { line, id } => f.debug_struct("Joined").field("line", line).field("id", id).finish(),
+            HubEvent::Left { line } => f.debug_struct("Left").field("line", line).finish(),
+            HubEvent::Packet { line, plane, bytes, .. } => {
+                f.debug_tuple("Packet").field(line).field(plane).field(&Size(bytes.len())).finish()
+            }
+        }
+    }
 }
 
 /// The hub: all lines of the star end here.
@@ -157,6 +169,7 @@ impl Switchboard {
             lines: Arc::clone(&lines),
             by_id: HashMap::new(),
             sessions: HashMap::new(),
+            admissions: 0,
         };
         let clerk = std::thread::Builder::new()
             .name("bus-clerk".into())
@@ -202,7 +215,10 @@ impl Switchboard {
     fn shut(&mut self) {
         let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner).clone();
         let deadline = Instant::now() + FAREWELL;
-        for inbox in lines.iter().filter_map(|line| line.inbox()).filter(|inbox| inbox.is_open()) {
+        let open: Vec<_> = lines.iter().filter_map(|line| line.inbox()).filter(|inbox| inbox.is_open()).collect();
+        // All are asked before any is waited for: a silent one must not use up the others' time.
+        let asked: Vec<_> = open.iter().filter(|inbox| inbox.outbox.ask_to_acknowledge().is_ok()).collect();
+        for inbox in asked {
             inbox.outbox.drain(deadline);
         }
         let (done, closed) = mpsc::channel();
@@ -232,8 +248,8 @@ impl fmt::Debug for Switchboard {
 enum Task {
     /// Somebody asks to be let in.
     Knock(Query),
-    /// The participant with this nonce is gone from its line.
-    Gone { line: LineId, nonce: u64 },
+    /// The participant of this admission is gone from its line.
+    Gone { line: LineId, admission: u64 },
     /// The end.
     Close(Sender<()>),
 }
@@ -247,11 +263,16 @@ struct Clerk {
     lines: Arc<Lines>,
     by_id: HashMap<String, LineId>,
     sessions: HashMap<LineId, LineSession>,
+    admissions: u64,
 }
 
 /// One admission: the session behind a port.
 struct LineSession {
+    /// Which of all admissions this is.
+    admission: u64,
+    /// Which incarnation of the participant it is for.
     nonce: u64,
+    port: u16,
     opened: Instant,
     session: Session,
     inbox: Arc<Inbox<HubEvent>>,
@@ -263,8 +284,8 @@ impl Clerk {
         while let Ok(task) = queue.recv() {
             match task {
                 Task::Knock(query) => self.answer(&query),
-                Task::Gone { line, nonce } => {
-                    if self.sessions.get(&line).is_some_and(|session| session.nonce == nonce) {
+                Task::Gone { line, admission } => {
+                    if self.sessions.get(&line).is_some_and(|session| session.admission == admission) {
                         self.retire(line);
                     }
                 }
@@ -325,14 +346,20 @@ impl Clerk {
             }
         };
         if let Some(session) = self.sessions.get(&line) {
-            // A participant that asks again has lost its session. One that was admitted a moment ago is on its way.
-            let alive = session.inbox.is_open() || session.opened.elapsed() < LEASE;
-            if session.nonce != request.nonce && alive {
+            let same = session.nonce == request.nonce;
+            // One that was admitted a moment ago is on its way.
+            if !same && (session.inbox.is_open() || session.opened.elapsed() < LEASE) {
                 return Ok(Err(Refusal::Taken { id: id.into() }));
             }
+            // The answer was late, and the participant asks again.
+            if same && session.inbox.is_waiting() {
+                return Ok(Ok(Admission { port: session.port }));
+            }
+            // The participant has lost its session before the hub noticed, or never came for it.
             self.retire(line);
         }
-        let (session, port) = self.open_line(line, id, request.nonce)?;
+        let session = self.open_line(line, id, request.nonce)?;
+        let port = session.port;
         self.sessions.insert(line, session);
         Ok(Ok(Admission { port }))
     }
@@ -356,7 +383,9 @@ impl Clerk {
         Some((session, inbox.close()))
     }
 
-    fn open_line(&self, line: LineId, id: &str, nonce: u64) -> Result<(LineSession, u16)> {
+    fn open_line(&mut self, line: LineId, id: &str, nonce: u64) -> Result<LineSession> {
+        self.admissions += 1;
+        let admission = self.admissions;
         let mut tries = 0;
         let (endpoint, session) = loop {
             let endpoint = self.endpoint.with_port(0).free()?;
@@ -404,7 +433,7 @@ impl Clerk {
             .declare_subscriber(participant_token(id, nonce))
             .callback(move |sign| {
                 if sign.kind() == SampleKind::Delete {
-                    let _ = tasks.lock().unwrap_or_else(PoisonError::into_inner).send(Task::Gone { line, nonce });
+                    let _ = tasks.lock().unwrap_or_else(PoisonError::into_inner).send(Task::Gone { line, admission });
                 }
             })
             .background()
@@ -413,6 +442,14 @@ impl Clerk {
         let token = session.liveliness().declare_token(hub_token(id)).wait().map_err(Error::middleware)?;
 
         hub_line.set_inbox(Some(Arc::clone(&inbox)));
-        Ok((LineSession { nonce, opened: Instant::now(), session, inbox, _hub_token: token }, endpoint.port()))
+        Ok(LineSession {
+            admission,
+            nonce,
+            port: endpoint.port(),
+            opened: Instant::now(),
+            session,
+            inbox,
+            _hub_token: token,
+        })
     }
 }

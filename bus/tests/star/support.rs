@@ -10,6 +10,7 @@ use bus::line::{Line, LineConfig, LineEvent};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use bus::{PROTOCOL_VERSION, Plane};
+use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 use zenoh::{Config, Session, Wait};
 
 pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
@@ -40,6 +41,7 @@ pub(crate) fn hub() -> (Switchboard, Receiver<HubEvent>) {
 pub(crate) fn line(endpoint: &Endpoint, id: &str) -> (Line, Receiver<LineEvent>) {
     let mut config = LineConfig::new(endpoint.clone(), id);
     config.patience = Some(PATIENCE);
+    config.queue = 1 << 16;
     let (line, events) = Line::connect(config).expect("the line connects");
     assert_eq!(next(&events), LineEvent::Connected);
     (line, events)
@@ -137,8 +139,15 @@ impl Actor {
         Actor(child)
     }
 
-    pub(crate) fn signal(&self, signal: rustix::process::Signal) {
-        rustix::process::kill_process(rustix::process::Pid::from_child(&self.0), signal).expect("the child exists");
+    /// Stops every thread of the process, and returns when they have stopped.
+    pub(crate) fn freeze(&self) {
+        let pid = Pid::from_child(&self.0);
+        kill_process(pid, Signal::STOP).expect("the child exists");
+        waitpid(Some(pid), WaitOptions::UNTRACED).expect("the child stops");
+    }
+
+    pub(crate) fn thaw(&self) {
+        kill_process(Pid::from_child(&self.0), Signal::CONT).expect("the child exists");
     }
 
     /// Kill -9.
