@@ -27,6 +27,8 @@ pub enum ConductInput {
     Lost,
     /// The fleet said something.
     FromFleet(FromFleet),
+    /// The person at the terminal wants it ended.
+    Interrupt,
 }
 
 /// What the conducted flight wants done.
@@ -75,6 +77,8 @@ pub struct Conduct {
     pace: Pace,
     /// How long to wait until every vehicle is armed.
     patience: Option<Span>,
+    /// Whether logs are collected over the network; a run that started its own processes finds them on disk.
+    collects: bool,
     step: Step,
     since: Time,
     next_poll: Time,
@@ -95,8 +99,9 @@ struct Wanted {
 
 impl Conduct {
     /// The flight of this mission file.
-    pub fn new(mission: &str, pace: Pace, patience: Option<Span>) -> Conduct {
+    pub fn new(mission: &str, pace: Pace, patience: Option<Span>, collects: bool) -> Conduct {
         Conduct {
+            collects,
             digest: common::mission::digest(mission),
             mission: mission.to_string(),
             pace,
@@ -198,7 +203,9 @@ impl Conduct {
             self.ended = status.phase;
             self.since = now;
         }
-        if !still_flying && (!out_of_reach || now - self.since > RETURN_PATIENCE) || now - self.since > RETURN_PATIENCE * 2 {
+        if !still_flying && (!out_of_reach || now - self.since > RETURN_PATIENCE)
+            || now - self.since > RETURN_PATIENCE * 2
+        {
             self.over(now, status);
         }
     }
@@ -207,8 +214,10 @@ impl Conduct {
         self.ended = status.phase;
         self.outputs.push_back(ConductOutput::Over(status.phase));
         let wanted = |who: &str| Wanted { who: who.to_string(), file: 0, offset: 0, asked: None, tries: 0 };
-        self.to_collect.push_back(wanted(HUB));
-        for vehicle in &status.vehicles {
+        if self.collects {
+            self.to_collect.push_back(wanted(HUB));
+        }
+        for vehicle in status.vehicles.iter().filter(|_| self.collects) {
             if vehicle.connected {
                 self.to_collect.push_back(wanted(&vehicle.id));
             } else {
@@ -238,6 +247,7 @@ impl Conduct {
         }
         self.step = Step::Ended;
         let missing = std::mem::take(&mut self.missing);
+        self.send(ToFleet::Dismiss);
         self.outputs.push_back(ConductOutput::Done { phase: self.ended, missing });
     }
 
@@ -285,6 +295,11 @@ impl Machine for Conduct {
                 _ => {}
             },
             Some(ConductInput::FromFleet(FromFleet::SpeedTaken { .. })) => {}
+            Some(ConductInput::Interrupt) => match self.step {
+                Step::Starting | Step::Flying => self.send(ToFleet::Stop),
+                Step::Collecting | Step::Ended => {}
+                Step::Contact | Step::Arming => self.fail("interrupted before the start".to_string()),
+            },
             None => self.poll(now),
         }
     }

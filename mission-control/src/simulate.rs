@@ -15,6 +15,9 @@ use vehicle_node::node::{NodeInput, NodeOutput, VehicleNode};
 
 use crate::conduct::{Conduct, ConductInput, ConductOutput};
 
+/// How often mission-control asks a fleet that has come to rest before it gives up.
+const PATIENCE: u32 = 100;
+
 /// How a simulation ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
@@ -57,7 +60,7 @@ pub fn simulate(
         mission,
         hub: Hub::new(),
         nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::new(&vehicle.id)).collect(),
-        conduct: Conduct::new(&mission.text, Pace::Stepped, None),
+        conduct: Conduct::new(&mission.text, Pace::Stepped, None, false),
         events: VecDeque::new(),
         now: Time::ZERO,
         outcome: None,
@@ -68,6 +71,7 @@ pub fn simulate(
     }
     fleet.events.push_back(Event::ToConduct(ConductInput::Connected));
     let mut told = Time::from_nanos(i64::MIN);
+    let (mut quiet, mut asked_at) = (0, told);
     loop {
         while let Some(event) = fleet.events.pop_front() {
             fleet.step(event, &mut record);
@@ -83,6 +87,11 @@ pub fn simulate(
             }
         }
         // All is quiet: mission-control asks how it stands.
+        quiet = if fleet.now == asked_at { quiet + 1 } else { 0 };
+        asked_at = fleet.now;
+        if quiet > PATIENCE {
+            return Err(format!("the fleet came to rest at {} before the flight was over", fleet.now));
+        }
         match fleet.conduct.poll_timeout() {
             Some(at) => fleet.conduct.handle(at, None),
             None => return Err("mission-control came to rest before the flight was over".to_string()),
@@ -126,7 +135,7 @@ impl Fleet<'_> {
                 }
                 HubOutput::Record(row) => record(row),
                 HubOutput::StartClock(_) => {
-                    self.events.push_back(Event::ToHub(HubInput::ClockStarted(ClockPlan::Stepped)));
+                    self.hub.handle(self.now, Some(HubInput::ClockStarted(ClockPlan::Stepped)));
                 }
                 // A stepped clock delivers with the grant; logs are not files here; the console is elsewhere.
                 HubOutput::Deliver(..)
@@ -150,7 +159,8 @@ impl Fleet<'_> {
                 }
                 NodeOutput::Record(row) => record(row),
                 NodeOutput::OpenLog { .. } => {
-                    self.events.push_back(Event::ToNode(index, NodeInput::LogOpened { last: None }));
+                    // Answered at once, as the loop of the processes does.
+                    self.nodes[index].handle(self.now, Some(NodeInput::LogOpened { last: None }));
                 }
                 NodeOutput::Transmit(_)
                 | NodeOutput::Dismissed

@@ -205,7 +205,8 @@ impl Hub {
             ToFleet::Speed { speed } => self.speed(now, speed),
             ToFleet::Stop => self.stop(now, "stopped by mission-control"),
             ToFleet::Dismiss => {
-                let ids: Vec<String> = self.vehicles.iter().filter(|(_, k)| k.connected).map(|(id, _)| id.clone()).collect();
+                let ids: Vec<String> =
+                    self.vehicles.iter().filter(|(_, k)| k.connected).map(|(id, _)| id.clone()).collect();
                 for id in ids {
                     self.to_vehicle(&id, ToVehicle::Dismiss);
                 }

@@ -187,7 +187,9 @@ impl VehicleNode {
 
     /// Whether the flight began without this vehicle.
     fn is_late(&self, now: Time) -> bool {
-        self.load.as_ref().is_some_and(|load| now > Time::ZERO + load.mission.control_period * load.mission.message_ticks)
+        self.load
+            .as_ref()
+            .is_some_and(|load| now > Time::ZERO + load.mission.control_period * load.mission.message_ticks)
     }
 
     /// The log is open: begin, or join the others where this vehicle should be by now.

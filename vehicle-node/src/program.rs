@@ -25,9 +25,13 @@ use crate::node::{NodeInput, NodeOutput, VehicleNode};
 ///
 /// Exit codes: 0 ended as asked, 2 wrong use, 3 no way to the network-emulator, 4 recording failed.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "vehicle-node", version, after_help = "Example, one terminal each:\n  \
+#[command(
+    name = "vehicle-node",
+    version,
+    after_help = "Example, one terminal each:\n  \
     network-emulator\n  vehicle-node --id auv1\n  vehicle-node --id auv2\n  vehicle-node --id auv3\n  \
-    mission-control run missions/auv-helix.toml --attach")]
+    mission-control run missions/auv-helix.toml --attach"
+)]
 pub struct Args {
     /// The vehicle's name in the mission file [default: the host's name]
     #[arg(long, env = "CPF_ID")]

@@ -58,4 +58,3 @@ pub trait Craft: Send {
     /// True while every state is finite.
     fn is_sound(&self) -> bool;
 }
-

@@ -66,9 +66,8 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = nominal_factor(&file.coordination.law);
-    let vehicles: Vec<Option<VehiclePlan>> = (0..file.vehicles.len())
-        .map(|i| check_vehicle(faults, file, i, law.as_deref(), factor, fastest))
-        .collect();
+    let vehicles: Vec<Option<VehiclePlan>> =
+        (0..file.vehicles.len()).map(|i| check_vehicle(faults, file, i, law.as_deref(), factor, fastest)).collect();
     let (times, speed, law, links, switching) = (times?, speed?, law?, links?, switching?);
     let mission = Mission {
         digest: digest(text),
@@ -169,10 +168,8 @@ fn check_formation(faults: &mut Collector<'_>, file: &MissionFile) -> Option<Spe
             if steps.is_empty() {
                 faults.fault("formation.profile", "no steps", "at least one step, the first from 0 s");
             }
-            let command = |step: &super::file::SpeedStep| SpeedCommand {
-                at: Time::from_secs(step.from_s),
-                speed: step.speed,
-            };
+            let command =
+                |step: &super::file::SpeedStep| SpeedCommand { at: Time::from_secs(step.from_s), speed: step.speed };
             Some(SpeedProfile::new(steps.iter().map(command).collect()))
         }
         (Some(_), Some(_)) => {
@@ -368,7 +365,12 @@ fn check_switching(
             for (i, interval) in choice.up.iter().enumerate() {
                 let key = format!("{key}.up[{i}]");
                 faults.number(&format!("{key}.from_s"), interval.from_s, interval.from_s >= 0.0, "0 s or later");
-                faults.number(&format!("{key}.to_s"), interval.to_s, interval.to_s > interval.from_s, "later than from_s");
+                faults.number(
+                    &format!("{key}.to_s"),
+                    interval.to_s,
+                    interval.to_s > interval.from_s,
+                    "later than from_s",
+                );
                 let chosen = interval.links.as_ref().map(|pairs| {
                     let index = |pair: &[String; 2]| {
                         let (from, to) = resolve(faults, &format!("{key}.links"), pair, ids)?;
@@ -438,9 +440,13 @@ fn check_vehicle(
     let section = &file.vehicles[index];
     let key = format!("vehicles[{index}]");
     let start = &section.start;
-    for (name, value) in
-        [("x_m", start.x_m), ("y_m", start.y_m), ("z_m", start.z_m), ("yaw_deg", start.yaw_deg), ("speed_mps", start.speed_mps)]
-    {
+    for (name, value) in [
+        ("x_m", start.x_m),
+        ("y_m", start.y_m),
+        ("z_m", start.z_m),
+        ("yaw_deg", start.yaw_deg),
+        ("speed_mps", start.speed_mps),
+    ] {
         faults.finite(&format!("{key}.start.{name}"), value, "");
     }
     faults.finite(&format!("{key}.pattern"), section.pattern, "units of xi");
@@ -450,7 +456,11 @@ fn check_vehicle(
     let model = section.model.clone().or_else(|| file.fleet.model.clone());
     let following = section.following.clone().or_else(|| file.fleet.following.clone());
     if model.is_none() {
-        faults.fault(&key, "no model", "a model here or in [fleet]: kinematic_unicycle, dynamic_unicycle or underactuated_auv");
+        faults.fault(
+            &key,
+            "no model",
+            "a model here or in [fleet]: kinematic_unicycle, dynamic_unicycle or underactuated_auv",
+        );
     }
     if following.is_none() {
         let allowed = "a following law here or in [fleet]: line_of_sight, proposition31 or theorem47";
@@ -470,12 +480,7 @@ fn check_vehicle(
     let position = Vector3::new(start.x_m, start.y_m, start.z_m);
     let usable = position.iter().all(|x| x.is_finite());
     let xi = start.xi.or_else(|| usable.then(|| closest_parameter(path.as_ref(), position, true)))?;
-    let start = Start {
-        position: position.into(),
-        yaw: start.yaw_deg.to_radians(),
-        speed: start.speed_mps,
-        xi,
-    };
+    let start = Start { position: position.into(), yaw: start.yaw_deg.to_radians(), speed: start.speed_mps, xi };
     let plan = VehiclePlan { id: section.id.clone(), pattern: section.pattern, path, start, model, following };
     if let Err(reason) = build::craft(&plan, start, factor, fastest, law.map_or(DemandKind::Rate, |law| law.kind())) {
         faults.fault(&format!("{key}.{}", following_key(section)), reason, "");
@@ -535,7 +540,11 @@ fn check_fit(
             section.id,
             following_name(following)
         );
-        faults.fault("coordination.law", found, "introduction, switching, delayed or delayed_with_losses for this vehicle");
+        faults.fault(
+            "coordination.law",
+            found,
+            "introduction, switching, delayed or delayed_with_losses for this vehicle",
+        );
         ok = false;
     }
     let path_key = format!("{key}.path.{}", path_name(&section.path));

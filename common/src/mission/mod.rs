@@ -175,6 +175,31 @@ impl Mission {
         }
     }
 
+    /// The steady along-path error that the design vector δ of Theorem 4.7 leaves \[m\] (erratum 4.12), for a vehicle that
+    /// has one.
+    pub fn predicted_along_bias(&self, vehicle: usize) -> Option<f64> {
+        let plan = &self.vehicles[vehicle];
+        match (&plan.model, &plan.following) {
+            (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) => {
+                Some(build::auv_gains(gains).predicted_bias(&build::auv(*model)))
+            }
+            _ => None,
+        }
+    }
+
+    /// Size of one coordination message \[bytes\].
+    pub fn message_bytes(&self) -> usize {
+        let state = crate::wire::state::CoordinationState {
+            mission: self.digest,
+            sender: 0,
+            seq: 0,
+            made: Time::ZERO,
+            xi: 0.0,
+            eta_over_r: self.law.needs_speed_error().then_some(0.0),
+        };
+        state.encode().len()
+    }
+
     /// The vehicle with its plant and its path-following law, where the mission starts it or at another place.
     ///
     /// # Errors

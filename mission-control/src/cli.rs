@@ -1,0 +1,396 @@
+//! The command line of mission-control.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bus::setup::Endpoint;
+use clap::{Parser, Subcommand, ValueEnum};
+use common::mission::Mission;
+use common::wire::fleet::{FromFleet, Pace, ToFleet};
+use common::wire::vehicle::Phase;
+
+use crate::results::{Summary, TheoryRow, diff, export_csv};
+use crate::run::{Failure, Plan, fly};
+use crate::{folder, operator, rehearse, theory};
+
+/// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
+/// over an emulated network, and reports on it.
+///
+/// Exit codes: 0 all is well, 1 the flight was aborted or two runs differ, 2 a wrong mission or command, 3 the fleet
+/// cannot be reached, 4 files cannot be read or written.
+#[derive(Debug, Parser)]
+#[command(
+    name = "mission-control",
+    version,
+    after_help = "Start here:\n  \
+    mission-control run missions/auv-helix.toml --speed-up 20\n  \
+    mission-control simulate missions/auv-helix.toml\n  \
+    mission-control check missions/auv-helix.toml"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Check a mission file: what is wrong with it, or what theory says of it
+    Check {
+        /// The mission file
+        mission: PathBuf,
+        /// JSON for a pipe
+        #[arg(long)]
+        json: bool,
+    },
+    /// Fly a mission in one thread, as fast as it goes
+    Simulate {
+        /// The mission file
+        mission: PathBuf,
+        /// The run folder [default: runs/<mission>-<time>]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// JSON for a pipe
+        #[arg(long)]
+        json: bool,
+    },
+    /// Fly a mission as real processes: one per vehicle, one for the network between them
+    Run(RunArgs),
+    /// Set the formation speed of the fleet under way
+    Speed {
+        /// The speed v_L [units of xi per s]
+        #[arg(allow_negative_numbers = true)]
+        speed: f64,
+        #[command(flatten)]
+        fleet: FleetArgs,
+    },
+    /// Tell how the fleet is
+    Status {
+        /// JSON for a pipe
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        fleet: FleetArgs,
+    },
+    /// End the flight under way
+    Stop {
+        #[command(flatten)]
+        fleet: FleetArgs,
+    },
+    /// Make summary, figures and report of a run again
+    Report {
+        /// The run folder
+        run: PathBuf,
+    },
+    /// Write a run's recording in another format
+    Export {
+        /// The run folder, or a recording
+        run: PathBuf,
+        /// The format
+        #[arg(long, value_enum, default_value = "csv")]
+        format: Format,
+        /// Where to [default: the run folder]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Compare two runs: equal, or the first message or state in which they part
+    Diff {
+        /// A run folder, or a recording
+        a: PathBuf,
+        /// Another
+        b: PathBuf,
+    },
+    /// Make a whole recording of one that was cut off
+    Recover {
+        /// The recording that was cut off
+        recording: PathBuf,
+        /// The whole one [default: <name>-recovered.mcap beside it]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// Print the JSON schema of the mission file, for editors
+    Schema,
+    #[command(hide = true)]
+    VehicleNode(vehicle_node::program::Args),
+    #[command(hide = true)]
+    NetworkEmulator(network_emulator::program::Args),
+}
+
+#[derive(Debug, clap::Args)]
+struct RunArgs {
+    /// The mission file
+    mission: PathBuf,
+    /// The run folder [default: runs/<mission>-<time>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Fly with a fleet that is already up, at this endpoint [default: tcp/127.0.0.1:7447]
+    #[arg(long, value_name = "tcp/HOST:PORT", num_args = 0..=1, default_missing_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
+    attach: Option<Endpoint>,
+    /// Where the own network-emulator listens [default: tcp/127.0.0.1:7447, or a free port if that is taken]
+    #[arg(long, value_name = "tcp/HOST:PORT", conflicts_with = "attach")]
+    listen: Option<Endpoint>,
+    /// Mission seconds per second of wall clock
+    #[arg(long, value_name = "FACTOR", default_value = "1", conflicts_with = "stepped")]
+    speed_up: f64,
+    /// Advance in lock step, as fast as the processes can; equals `simulate` bit for bit
+    #[arg(long)]
+    stepped: bool,
+    /// Give up when the fleet is not complete after this long [s] [default: never with --attach, 60 s else]
+    #[arg(long, value_name = "SECONDS")]
+    patience: Option<f64>,
+    /// JSON for a pipe
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+struct FleetArgs {
+    /// The fleet's network-emulator
+    #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
+    attach: Endpoint,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Format {
+    /// vehicles.csv, links.csv and topology.csv
+    Csv,
+}
+
+/// How long a single command waits for the fleet to appear.
+const COMMAND_PATIENCE: Duration = Duration::from_secs(3);
+
+/// Why a command ends, and with which exit code.
+struct End(u8, String);
+
+type Ended = Result<ExitCode, End>;
+
+/// Runs a command to its end.
+pub fn main(cli: Cli) -> ExitCode {
+    match run(cli.command) {
+        Ok(code) => code,
+        Err(End(code, reason)) => {
+            eprintln!("{reason}");
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn run(what: What) -> Ended {
+    match what {
+        What::Check { mission, json } => check(&mission, json),
+        What::Simulate { mission, out, json } => simulate(&mission, out.as_deref(), json),
+        What::Run(args) => run_fleet(args),
+        What::Speed { speed, fleet } => speed_command(speed, &fleet.attach),
+        What::Status { json, fleet } => status(json, &fleet.attach),
+        What::Stop { fleet } => stop(&fleet.attach),
+        What::Report { run } => report(&run),
+        What::Export { run, format: Format::Csv, out } => export(&run, out),
+        What::Diff { a, b } => compare(&a, &b),
+        What::Recover { recording, out } => recover(&recording, out),
+        What::Schema => {
+            println!("{:#}", common::mission::schema());
+            Ok(ExitCode::SUCCESS)
+        }
+        What::VehicleNode(args) => Ok(vehicle_node::program::run(args)),
+        What::NetworkEmulator(args) => Ok(network_emulator::program::run(args)),
+    }
+}
+
+fn load(path: &Path) -> Result<Arc<Mission>, End> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| End(2, format!("cannot read the mission file {}: {error}", path.display())))?;
+    Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
+        let n = faults.list.len();
+        End(
+            2,
+            format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display()),
+        )
+    })
+}
+
+fn check(path: &Path, json: bool) -> Ended {
+    let mission = load(path)?;
+    let rows = theory::rows(&mission, None);
+    if json {
+        let rows: Vec<_> = rows
+            .iter()
+            .map(|row| serde_json::json!({"name": row.name, "condition": row.condition, "holds": row.holds, "predicted": row.predicted}))
+            .collect();
+        let digest = format!("{:016x}", mission.digest);
+        println!("{:#}", serde_json::json!({"mission": mission.name, "digest": digest, "theory": rows}));
+    } else {
+        println!(
+            "{}: {} vehicles, {} directed links, {}",
+            mission.name,
+            mission.vehicles.len(),
+            mission.links.len(),
+            mission.end
+        );
+        print_theory(&rows);
+    }
+    warn(&rows);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A mission that violates a condition flies, with a warning that names it.
+fn warn(rows: &[TheoryRow]) {
+    for row in rows.iter().filter(|row| row.holds == Some(false)) {
+        eprintln!("warning: not covered by theory: {}: needs {}", row.name, row.condition);
+    }
+}
+
+fn print_theory(rows: &[TheoryRow]) {
+    for row in rows {
+        let holds = match row.holds {
+            Some(true) => "holds",
+            Some(false) => "does not hold",
+            None => "",
+        };
+        println!(
+            "  {}\n      needs {} {}\n      predicts {}",
+            row.name,
+            row.condition,
+            if holds.is_empty() { String::new() } else { format!("[{holds}]") },
+            row.predicted
+        );
+        if row.measured != "–" {
+            println!("      measured {}", row.measured);
+        }
+    }
+}
+
+fn simulate(path: &Path, out: Option<&Path>, json: bool) -> Ended {
+    let mission = load(path)?;
+    warn(&theory::rows(&mission, None));
+    let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
+    tell(&mission, &folder, outcome.phase, &summary, &[], json)
+}
+
+fn run_fleet(args: RunArgs) -> Ended {
+    let mission = load(&args.mission)?;
+    if !(args.speed_up.is_finite() && args.speed_up > 0.0 && args.speed_up <= 1000.0) {
+        return Err(End(2, format!("--speed-up: found {}; allowed: above 0 and at most 1000", args.speed_up)));
+    }
+    warn(&theory::rows(&mission, None));
+    let pace = if args.stepped { Pace::Stepped } else { Pace::Real { speed_up: args.speed_up } };
+    let plan = Plan {
+        mission: mission.clone(),
+        out: args.out,
+        attach: args.attach,
+        listen: args.listen,
+        pace,
+        patience: args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64),
+    };
+    match fly(&plan) {
+        Ok(flown) => tell(&mission, &flown.folder, flown.phase, &flown.summary, &flown.missing, args.json),
+        Err(Failure::Unreachable(reason)) => Err(End(3, reason)),
+        Err(Failure::Refused(reason)) => Err(End(1, reason)),
+        Err(Failure::Files(reason)) => Err(End(4, reason)),
+        Err(Failure::Detached(reason)) => {
+            eprintln!("{reason}");
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+/// What came of a flight, for a person or a pipe.
+fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missing: &[String], json: bool) -> Ended {
+    for text in missing {
+        eprintln!("warning: {text}");
+    }
+    if json {
+        println!("{}", serde_json::to_string_pretty(summary).map_err(|error| End(4, error.to_string()))?);
+    } else {
+        println!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
+        print_theory(&theory::rows(mission, Some(summary)));
+        let m = &summary.fleet.messages;
+        println!(
+            "  Messages: {} sent = {} delivered + {} lost + {} with the link down + {} with the queue full + {} in flight",
+            m.sent, m.delivered, m.lost, m.link_down, m.queue_full, m.in_flight
+        );
+        println!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
+        println!("report: {}", folder.join("report.html").display());
+    }
+    Ok(if phase == Phase::Finished { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn ask(endpoint: &Endpoint, question: &ToFleet) -> Result<FromFleet, End> {
+    match operator::ask(endpoint, question, COMMAND_PATIENCE) {
+        Ok(FromFleet::Refused { reason }) => Err(End(1, reason)),
+        Ok(answer) => Ok(answer),
+        Err(error) => Err(End(3, error)),
+    }
+}
+
+fn speed_command(speed: f64, endpoint: &Endpoint) -> Ended {
+    if let FromFleet::SpeedTaken { at, speed } = ask(endpoint, &ToFleet::Speed { speed })? {
+        println!("formation speed {speed} from {at} on");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn status(json: bool, endpoint: &Endpoint) -> Ended {
+    if let FromFleet::Status(status) = ask(endpoint, &ToFleet::Status)? {
+        if json {
+            let vehicles: Vec<_> = status
+                .vehicles
+                .iter()
+                .map(|v| serde_json::json!({"id": v.id, "connected": v.connected, "phase": v.phase.as_str(), "reason": v.reason}))
+                .collect();
+            let [sent, delivered, dropped, in_flight] = status.messages;
+            println!(
+                "{:#}",
+                serde_json::json!({
+                    "phase": status.phase.as_str(), "now_s": status.now.secs(), "end_s": status.end.secs(),
+                    "speed": status.speed, "vehicles": vehicles,
+                    "messages": {"sent": sent, "delivered": delivered, "dropped": dropped, "in_flight": in_flight},
+                })
+            );
+        } else {
+            print!("{}", operator::describe(&status));
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn stop(endpoint: &Endpoint) -> Ended {
+    ask(endpoint, &ToFleet::Stop)?;
+    println!("stopped");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn report(run: &Path) -> Ended {
+    folder::report(run, Vec::new()).map_err(|error| End(4, error))?;
+    println!("report: {}", run.join("report.html").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn export(run: &Path, out: Option<PathBuf>) -> Ended {
+    let recording = folder::recording(run).map_err(|error| End(4, error))?;
+    let beside = if run.is_dir() { run } else { run.parent().unwrap_or(Path::new(".")) };
+    let out = out.unwrap_or_else(|| beside.to_path_buf());
+    let failed = |error: std::io::Error| End(4, format!("cannot export to {}: {error}", out.display()));
+    std::fs::create_dir_all(&out).map_err(failed)?;
+    export_csv(&recording.exact, &out).map_err(failed)?;
+    println!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn compare(a: &Path, b: &Path) -> Ended {
+    let left = folder::recording(a).map_err(|error| End(4, error))?;
+    let right = folder::recording(b).map_err(|error| End(4, error))?;
+    let outcome = diff(&left, &right);
+    println!("{outcome}");
+    Ok(if matches!(outcome, crate::results::Outcome::Equal { .. }) { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
+    let out = out.unwrap_or_else(|| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        path.with_file_name(format!("{stem}-recovered.mcap"))
+    });
+    let recovered = bus::recording::recover(path, &out).map_err(|error| End(4, error.to_string()))?;
+    println!("{} rows to {}", recovered.rows, out.display());
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,71 @@
+//! Single commands to a fleet under way: `status`, `speed`, `stop`.
+
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use bus::Plane;
+use bus::clock::{Wake, recv_until};
+use bus::line::{Line, LineConfig, LineEvent};
+use bus::setup::Endpoint;
+use common::wire;
+use common::wire::fleet::{FleetStatus, FromFleet, ToFleet};
+use network_emulator::hub::OPERATOR;
+
+/// How long the fleet may take to answer.
+const ANSWER: Duration = Duration::from_secs(5);
+
+/// Asks the fleet one thing and gives its answer.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn ask(endpoint: &Endpoint, question: &ToFleet, patience: Duration) -> Result<FromFleet, String> {
+    let mut config = LineConfig::new(endpoint.clone(), OPERATOR);
+    config.patience = Some(patience);
+    let (line, events) = Line::connect(config).map_err(|error| error.to_string())?;
+    let answer = exchange(&line, &events, question);
+    line.close();
+    answer
+}
+
+fn exchange(line: &Line, events: &Receiver<LineEvent>, question: &ToFleet) -> Result<FromFleet, String> {
+    let deadline = Instant::now() + ANSWER;
+    loop {
+        match recv_until(events, Some(deadline)) {
+            Wake::Message(LineEvent::Connected) => {
+                line.send(Plane::Mission, &wire::encode(question)).map_err(|error| error.to_string())?;
+            }
+            Wake::Message(LineEvent::Packet { plane: Plane::Mission, bytes, .. }) => {
+                if let Ok(answer) = wire::decode::<FromFleet>(&bytes) {
+                    return Ok(answer);
+                }
+            }
+            Wake::Message(LineEvent::Refused(refusal)) => return Err(refusal.to_string()),
+            Wake::Message(_) => {}
+            Wake::Deadline => return Err(format!("the fleet did not answer within {} s", ANSWER.as_secs())),
+            Wake::Closed => return Err("the line to the fleet closed".to_string()),
+        }
+    }
+}
+
+/// A status for a person.
+pub fn describe(status: &FleetStatus) -> String {
+    use std::fmt::Write as _;
+    let mut text = String::new();
+    let name = common::mission::Mission::parse("the mission", &status.mission).map_or("no mission".into(), |m| m.name);
+    let _ = writeln!(
+        text,
+        "{name}: {} at {:.1} of {:.1} s, formation speed {}",
+        status.phase.as_str(),
+        status.now.secs(),
+        status.end.secs(),
+        status.speed
+    );
+    let [sent, delivered, dropped, in_flight] = status.messages;
+    let _ = writeln!(text, "messages: {sent} sent = {delivered} delivered + {dropped} dropped + {in_flight} in flight");
+    for vehicle in &status.vehicles {
+        let line = if vehicle.connected { "connected" } else { "not connected" };
+        let reason = if vehicle.reason.is_empty() { String::new() } else { format!(": {}", vehicle.reason) };
+        let _ = writeln!(text, "  {:<16} {:<14} {}{reason}", vehicle.id, line, vehicle.phase.as_str());
+    }
+    text
+}

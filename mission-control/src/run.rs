@@ -1,0 +1,373 @@
+//! `run`: conducts a flight of real processes, its own or a fleet that is already up.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bus::Plane;
+use bus::console::StopFlag;
+use bus::drive::{Clock, Next, Port, drive};
+use bus::line::{Line, LineConfig, LineEvent};
+use bus::recording::merge;
+use bus::setup::Endpoint;
+use common::mission::Mission;
+use common::time::Span;
+use common::wire::fleet::{FleetStatus, FromFleet, Pace};
+use common::wire::vehicle::{LogPiece, Phase};
+use common::wire::{self, GarbageCount};
+use network_emulator::hub::COLLECTOR;
+
+use crate::conduct::{Conduct, ConductInput, ConductOutput, Step};
+use crate::console::Progress;
+use crate::folder::{self, HostFacts, MISSION, RECORDING};
+use crate::results::Summary;
+
+/// How long own processes may take to come up.
+const OWN_PATIENCE: Duration = Duration::from_secs(60);
+/// How long own processes may take to end after they were dismissed.
+const FAREWELL: Duration = Duration::from_secs(3);
+
+/// How a flight shall be flown.
+pub struct Plan {
+    /// The mission.
+    pub mission: Arc<Mission>,
+    /// Its run folder, if not `runs/<mission>-<time>`.
+    pub out: Option<PathBuf>,
+    /// A fleet that is already up; without it, own processes are started.
+    pub attach: Option<Endpoint>,
+    /// Where an own emulator listens; without it, the usual place or a free port.
+    pub listen: Option<Endpoint>,
+    /// How mission time passes.
+    pub pace: Pace,
+    /// How long to wait until every vehicle of a fleet that is already up is armed.
+    pub patience: Option<Duration>,
+}
+
+/// What became of a flight.
+pub struct Flown {
+    /// Its run folder.
+    pub folder: PathBuf,
+    /// Finished, or Aborted.
+    pub phase: Phase,
+    /// Its numbers.
+    pub summary: Summary,
+    /// What is missing, and why.
+    pub missing: Vec<String>,
+}
+
+/// Why a flight came to nothing.
+#[derive(Debug)]
+pub enum Failure {
+    /// The fleet could not be reached, or its processes not started.
+    Unreachable(String),
+    /// The fleet refused, or the flight was interrupted before it began.
+    Refused(String),
+    /// Files could not be written.
+    Files(String),
+    /// The person at the terminal left a fleet that flies on.
+    Detached(String),
+}
+
+/// Flies a mission and reports on it.
+///
+/// # Errors
+/// Why there is no flight to report on.
+pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
+    let folder = folder::make(plan.out.as_deref(), &plan.mission).map_err(Failure::Files)?;
+    let begun = Instant::now();
+    let own = plan.attach.is_none();
+    let stop = StopFlag::on_signals();
+    let (endpoint, mut processes) = match &plan.attach {
+        Some(endpoint) => (endpoint.clone(), Processes::default()),
+        None => Processes::start(&plan.mission, &folder, plan.listen.clone())?,
+    };
+    let mut config = LineConfig::new(endpoint.clone(), COLLECTOR);
+    config.patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
+    let (line, events) = Line::connect(config).map_err(|error| Failure::Unreachable(error.to_string()))?;
+    stop.arm();
+    let patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
+    let patience = patience.map(|p| Span::from_secs(p.as_secs_f64()));
+    let mut conduct = Conduct::new(&plan.mission.text, plan.pace, patience, !own);
+    let mut port = ConductPort {
+        line,
+        own,
+        processes: &mut processes,
+        progress: Progress::new(plan.mission.end),
+        collected: folder.join(".collected"),
+        stop,
+        interrupted: false,
+        garbage: GarbageCount::default(),
+    };
+    let exit = drive(&mut conduct, &mut port, &mut Clock::from_now(), &events);
+    port.progress.done();
+    let collected = port.collected.clone();
+    port.line.close();
+    let (phase, missing) = exit?;
+    let mut missing: Vec<String> = missing.into_iter().map(|(who, why)| format!("log of {who}: {why}")).collect();
+    missing.extend(processes.end());
+
+    let logs = if own {
+        files_below(&folder.join("logs").join(format!("{:016x}", plan.mission.digest)))
+    } else {
+        files_below(&collected)
+    };
+    let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
+    missing.extend(merged.incomplete.iter().map(|path| format!("{} ends in the middle", file_name(path))));
+    if !own {
+        let _ = fs::remove_dir_all(&collected);
+    }
+    let how = match (plan.pace, own) {
+        (Pace::Stepped, _) => "mission-control run --stepped",
+        (_, true) => "mission-control run",
+        (_, false) => "mission-control run --attach",
+    };
+    let host = HostFacts::now(how, begun.elapsed().as_secs_f64(), missing.clone());
+    let summary = folder::finish(&folder, &host).map_err(Failure::Files)?;
+    Ok(Flown { folder, phase, summary, missing })
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The recordings in a folder, in the order of their names.
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    files.sort();
+    files
+}
+
+// --- the processes of an own fleet -------------------------------------------------------------------------------------
+
+/// The processes of an own fleet, by name.
+#[derive(Default)]
+struct Processes {
+    running: BTreeMap<String, Child>,
+    ended: Vec<String>,
+}
+
+impl Processes {
+    /// Starts the emulator, then a process per vehicle. All are this very program under other names.
+    fn start(mission: &Mission, folder: &Path, listen: Option<Endpoint>) -> Result<(Endpoint, Processes), Failure> {
+        let logs = folder.join("logs");
+        fs::create_dir_all(&logs)
+            .map_err(|error| Failure::Files(format!("cannot make {}: {error}", logs.display())))?;
+        let mut processes = Processes::default();
+        let listen = listen.unwrap_or_else(|| {
+            let usual = Endpoint::local();
+            let free = TcpListener::bind((usual.host(), usual.port())).is_ok();
+            if free { usual } else { usual.with_port(0) }
+        });
+        let mut emulator = processes.spawn(&logs, "network-emulator", &["--listen", &listen.to_string()])?;
+        let mut endpoint = String::new();
+        let stdout = emulator.stdout.take();
+        if let Some(stdout) = stdout {
+            let _ = BufReader::new(stdout).read_line(&mut endpoint);
+        }
+        processes.running.insert("network-emulator".into(), emulator);
+        let endpoint: Endpoint = endpoint.trim().parse().map_err(|_| {
+            let _ = processes.end();
+            let log = logs.join("network-emulator.log");
+            let said = fs::read_to_string(&log).unwrap_or_default();
+            let last = said.lines().last().unwrap_or("it said nothing").to_string();
+            Failure::Unreachable(format!("the network-emulator did not come up: {last}"))
+        })?;
+        eprintln!("network-emulator listens on {endpoint}; another terminal can use --attach {endpoint}");
+        for vehicle in &mission.vehicles {
+            let child = processes.spawn(&logs, &vehicle.id, &["--id", &vehicle.id, "--connect", &endpoint.to_string()]);
+            match child {
+                Ok(child) => processes.running.insert(vehicle.id.clone(), child),
+                Err(failure) => {
+                    let _ = processes.end();
+                    return Err(failure);
+                }
+            };
+        }
+        Ok((endpoint, processes))
+    }
+
+    fn spawn(&self, logs: &Path, name: &str, arguments: &[&str]) -> Result<Child, Failure> {
+        let failed = |error: std::io::Error| Failure::Unreachable(format!("cannot start {name}: {error}"));
+        let said = File::create(logs.join(format!("{name}.log"))).map_err(failed)?;
+        let program = if name == "network-emulator" { "network-emulator" } else { "vehicle-node" };
+        Command::new(std::env::current_exe().map_err(failed)?)
+            .arg(program)
+            .args(arguments)
+            .arg("--once")
+            .args([std::ffi::OsStr::new("--logs"), logs.as_os_str()])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(said)
+            .spawn()
+            .map_err(failed)
+    }
+
+    /// Processes that have ended since the last look, in words.
+    fn look(&mut self) -> Vec<String> {
+        let mut news = Vec::new();
+        self.running.retain(|name, child| match child.try_wait() {
+            Ok(Some(status)) => {
+                news.push(format!("{name} has ended ({status})"));
+                false
+            }
+            _ => true,
+        });
+        self.ended.extend(news.iter().cloned());
+        news
+    }
+
+    /// Waits for all to end, makes those that do not, and tells of those that ended early.
+    fn end(&mut self) -> Vec<String> {
+        let early = std::mem::take(&mut self.ended);
+        let deadline = Instant::now() + FAREWELL;
+        while !self.running.is_empty() && Instant::now() < deadline {
+            self.look();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        for child in self.running.values_mut() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+        self.running.clear();
+        early
+    }
+}
+
+impl Drop for Processes {
+    fn drop(&mut self) {
+        for child in self.running.values_mut() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+// --- the port ----------------------------------------------------------------------------------------------------------
+
+struct ConductPort<'p> {
+    line: Line,
+    own: bool,
+    processes: &'p mut Processes,
+    progress: Progress,
+    collected: PathBuf,
+    stop: StopFlag,
+    interrupted: bool,
+    garbage: GarbageCount,
+}
+
+type Ending = Result<(Phase, Vec<(String, String)>), Failure>;
+
+impl ConductPort<'_> {
+    fn tell(&mut self, step: Step, status: Option<&FleetStatus>) {
+        let name = match step {
+            Step::Contact => "contact",
+            Step::Arming => "arming",
+            Step::Starting => "starting",
+            Step::Flying => "flying",
+            Step::Collecting | Step::Ended => "collecting",
+        };
+        let Some(status) = status else {
+            return self.progress.line("lost the network-emulator; looking for it");
+        };
+        let [sent, delivered, dropped, _] = status.messages;
+        let away: Vec<&str> = status.vehicles.iter().filter(|v| !v.connected).map(|v| v.id.as_str()).collect();
+        let away = if away.is_empty() { String::new() } else { format!("; waiting for {}", away.join(", ")) };
+        let message = match step {
+            Step::Flying => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{away}"),
+            _ => away.trim_start_matches("; ").to_string(),
+        };
+        self.progress.reached(name, status.now, &message);
+    }
+
+    fn keep(&self, who: &str, piece: &LogPiece) -> Result<(), String> {
+        let path = self.collected.join(format!("{who}-{}.mcap", piece.file + 1));
+        let failed = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
+        fs::create_dir_all(&self.collected).map_err(failed)?;
+        let mut file =
+            OpenOptions::new().create(true).write(true).truncate(piece.offset == 0).open(&path).map_err(failed)?;
+        file.seek(SeekFrom::Start(piece.offset)).map_err(failed)?;
+        file.write_all(&piece.bytes).map_err(failed)
+    }
+}
+
+impl Port for ConductPort<'_> {
+    type Machine = Conduct;
+    type Event = LineEvent;
+    type Exit = Ending;
+
+    fn translate(&mut self, event: LineEvent) -> Option<(Option<Instant>, ConductInput)> {
+        match event {
+            LineEvent::Connected => Some((None, ConductInput::Connected)),
+            LineEvent::Lost => Some((None, ConductInput::Lost)),
+            LineEvent::Refused(refusal) => {
+                self.progress.line(&refusal.to_string());
+                None
+            }
+            LineEvent::Packet { plane: Plane::Mission, bytes, .. } => match wire::decode::<FromFleet>(&bytes) {
+                Ok(message) => Some((None, ConductInput::FromFleet(message))),
+                Err(kind) => {
+                    if self.garbage.count(kind) {
+                        self.progress.line(&format!("ignored a message of the fleet: {}", kind.as_str()));
+                    }
+                    None
+                }
+            },
+            LineEvent::Packet { .. } => None,
+        }
+    }
+
+    fn perform(&mut self, output: ConductOutput, _clock: &mut Clock) -> Next<Self> {
+        match output {
+            ConductOutput::Send(message) => {
+                // What is not sent is asked again with the next poll.
+                let _ = self.line.send(Plane::Mission, &wire::encode(&message));
+            }
+            ConductOutput::Progress(step, status) => self.tell(step, status.as_ref()),
+            ConductOutput::Over(_) => {}
+            ConductOutput::Log { who, piece } => {
+                if let Err(error) = self.keep(&who, &piece) {
+                    return Next::Exit(Err(Failure::Files(error)));
+                }
+            }
+            ConductOutput::Done { phase, missing } => return Next::Exit(Ok((phase, missing))),
+            ConductOutput::Failed(reason) => return Next::Exit(Err(Failure::Refused(reason))),
+        }
+        Next::Go
+    }
+
+    fn tend(&mut self, _conduct: &Conduct) -> Next<Self> {
+        for news in self.processes.look() {
+            self.progress.line(&news);
+        }
+        if self.stop.is_raised() && !self.interrupted {
+            self.interrupted = true;
+            if !self.own {
+                let reason = "left; the fleet flies on. Attach again with the same command, or end it with: mission-control stop";
+                return Next::Exit(Err(Failure::Detached(reason.to_string())));
+            }
+            self.stop.arm();
+            self.progress.line("stopping the flight; once more ends at once");
+            return Next::Feed(ConductInput::Interrupt);
+        }
+        if self.own && self.processes.running.is_empty() && !self.processes.ended.is_empty() {
+            let reason = "every process of the fleet has ended; see logs/ in the run folder".to_string();
+            return Next::Exit(Err(Failure::Unreachable(reason)));
+        }
+        Next::Go
+    }
+
+    fn closed(&mut self) -> Ending {
+        Err(Failure::Unreachable("the line to the fleet is closed".to_string()))
+    }
+}
+
+/// The mission file that a run folder keeps.
+pub fn mission_of(folder: &Path) -> PathBuf {
+    folder.join(MISSION)
+}
