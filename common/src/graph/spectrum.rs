@@ -1,0 +1,289 @@
+//! Eigenvalues that say how fast a graph agrees, and the error vector that measures it (section 4.2.2).
+//!
+//! Where gains are asked for, they are the k_i > 0 of K = diag(k_i), one per vehicle; β := K⁻¹1.
+
+use nalgebra::{Complex, DMatrix, DVector, Schur};
+
+use super::Graph;
+
+/// Eigenvalues of a symmetric matrix in increasing order; only its lower triangle is read. None at all if it holds
+/// something that is not a finite number.
+pub fn symmetric_eigenvalues(matrix: &DMatrix<f64>) -> Vec<f64> {
+    if matrix.is_empty() || matrix.iter().any(|entry| !entry.is_finite()) {
+        return Vec::new();
+    }
+    let mut eigenvalues: Vec<f64> = matrix.symmetric_eigenvalues().iter().copied().collect();
+    eigenvalues.sort_unstable_by(f64::total_cmp);
+    eigenvalues
+}
+
+/// Eigenvalues of any square matrix, by real part and then by imaginary part; `None` if the iteration that looks for
+/// them does not settle (or the matrix holds something that is not a number).
+pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+    if !matrix.is_square() || matrix.iter().any(|entry| !entry.is_finite()) {
+        return None;
+    }
+    if matrix.is_empty() {
+        return Some(Vec::new());
+    }
+    let most_steps = 100 * matrix.nrows();
+    let schur = Schur::try_new(matrix.clone(), f64::EPSILON, most_steps)?;
+    let mut eigenvalues: Vec<Complex<f64>> = schur.complex_eigenvalues().iter().copied().collect();
+    eigenvalues.sort_unstable_by(|a, b| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
+    Some(eigenvalues)
+}
+
+/// λ_2, the connectivity of a graph with two-way links: the second smallest eigenvalue of L, positive iff connected.
+/// `None` for one-way links or fewer than two vertices.
+#[doc(alias = "λ_2")]
+pub fn lambda_2(graph: &Graph) -> Option<f64> {
+    let eigenvalues = graph.is_undirected().then(|| symmetric_eigenvalues(&graph.laplacian()))?;
+    eigenvalues.get(1).map(|lambda_2| lambda_2.max(0.0))
+}
+
+/// β := K⁻¹1 (4.12).
+#[doc(alias = "β")]
+pub fn beta(gains: &[f64]) -> DVector<f64> {
+    DVector::from_iterator(gains.len(), gains.iter().map(|k| 1.0 / k))
+}
+
+/// ℒ_β := I − 1β'/(β'1) (4.13), which takes γ to its errors γ~ = ℒ_β γ from the average that K weighs.
+#[doc(alias = "L_β")]
+pub fn l_beta(gains: &[f64]) -> DMatrix<f64> {
+    let n = gains.len();
+    let beta = beta(gains);
+    DMatrix::identity(n, n) - DVector::from_element(n, 1.0) * beta.transpose() / beta.sum()
+}
+
+/// λ_m of Lemma 4.1, property 8: the least v'Lv/v'v with β'v = 0, over those of the graphs that are connected.
+///
+/// Computed as the least eigenvalue of L restricted to the complement of β; the closed form in the thesis is only a
+/// lower bound of it (erratum 4.6), see [`lambda_m_lower_bound`]. `None` without a connected graph, if any graph has
+/// one-way links or another number of vertices than gains, or if a gain is not positive.
+#[doc(alias = "λ_m")]
+pub fn lambda_m(graphs: &[Graph], gains: &[f64]) -> Option<f64> {
+    let complement = orthogonal_complement(&beta(gains));
+    least_over_connected(graphs, gains, |graph| {
+        symmetric_eigenvalues(&(complement.transpose() * graph.laplacian() * &complement)).first().copied()
+    })
+}
+
+/// λ_{2,m} of Lemma 4.1, property 8: the least connectivity among those of the graphs that are connected.
+/// `None` as for [`lambda_m`].
+#[doc(alias = "λ_2,m")]
+pub fn lambda_2m(graphs: &[Graph], gains: &[f64]) -> Option<f64> {
+    least_over_connected(graphs, gains, lambda_2)
+}
+
+/// (β'1)²/(n β'β) λ_{2,m} ≤ λ_m: the closed form of Lemma 4.1, property 8, with equality for complete graphs
+/// (erratum 4.6). `None` as for [`lambda_m`].
+///
+/// Off its mean, v with β'v = 0 keeps at least that part of its squared length: its mean part is (1'v)²/n =
+/// ((1 − cβ)'v)²/n ≤ |1 − cβ|²|v|²/n for every c, and the best c leaves 1 − (β'1)²/(n β'β) of |v|².
+pub fn lambda_m_lower_bound(graphs: &[Graph], gains: &[f64]) -> Option<f64> {
+    let beta = beta(gains);
+    let kept = beta.sum().powi(2) / (beta.len() as f64 * beta.norm_squared());
+    lambda_2m(graphs, gains).map(|lambda_2m| kept * lambda_2m)
+}
+
+/// The least λ_2(K^½ L K^½) over those of the graphs that are connected: exactly how fast ½ γ~'K⁻¹γ~ can be relied on
+/// to decay, at twice this rate. At least k_m λ_m. `None` as for [`lambda_m`].
+pub fn lambda_2_weighted(graphs: &[Graph], gains: &[f64]) -> Option<f64> {
+    let root = DMatrix::from_diagonal(&DVector::from_iterator(gains.len(), gains.iter().map(|k| k.sqrt())));
+    least_over_connected(graphs, gains, |graph| {
+        symmetric_eigenvalues(&(&root * graph.laplacian() * &root)).get(1).copied()
+    })
+}
+
+fn least_over_connected(graphs: &[Graph], gains: &[f64], value: impl Fn(&Graph) -> Option<f64>) -> Option<f64> {
+    let fits = |graph: &Graph| graph.len() == gains.len() && graph.is_undirected();
+    if !graphs.iter().all(fits) || !gains.iter().all(|&k| k > 0.0 && k.is_finite()) {
+        return None;
+    }
+    graphs.iter().filter(|graph| graph.is_connected()).filter_map(value).min_by(f64::total_cmp)
+}
+
+/// Columns that complete b/|b| to an orthonormal basis; b must not be zero. Unit vectors if b is one.
+///
+/// They are the columns of the reflection that takes b to its largest axis, without that one.
+pub(crate) fn orthogonal_complement(b: &DVector<f64>) -> DMatrix<f64> {
+    let n = b.len();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let pivot = b.iamax();
+    let mut normal = b / b.norm();
+    normal[pivot] += normal[pivot].signum();
+    let reflection = DMatrix::identity(n, n) - &normal * normal.transpose() * (2.0 / normal.norm_squared());
+    reflection.remove_column(pivot)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use nalgebra::{dmatrix, dvector};
+    use proptest::prelude::*;
+
+    /// Every graph with two-way links on n vertices, connected or not.
+    pub(crate) fn all_graphs(n: usize) -> Vec<Graph> {
+        let pairs: Vec<(usize, usize)> = (0..n).flat_map(|j| (0..j).map(move |i| (i, j))).collect();
+        (0..1u32 << pairs.len())
+            .map(|chosen| {
+                let edges: Vec<_> =
+                    pairs.iter().enumerate().filter(|(e, _)| chosen >> e & 1 == 1).map(|(_, pair)| *pair).collect();
+                Graph::from_edges(n, &edges)
+            })
+            .collect()
+    }
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-9 * (1.0 + a.abs().max(b.abs()))
+    }
+
+    #[test]
+    fn example_3_4_has_the_printed_eigenvalues() {
+        let graph = Graph::from_arcs(3, &[(0, 1), (0, 2), (2, 0)]);
+        let found = eigenvalues(&graph.laplacian()).expect("it settles");
+        let golden = (3.0 - 5f64.sqrt()) / 2.0;
+        for (eigenvalue, expected) in found.iter().zip([0.0, golden, 3.0 - golden]) {
+            assert!((eigenvalue - expected).norm() < 1e-12, "{eigenvalue} {expected}");
+        }
+        assert_eq!(((golden * 100.0).round(), ((3.0 - golden) * 100.0).round()), (38.0, 262.0), "as printed");
+        assert_eq!(lambda_2(&graph), None, "no symmetric Laplacian");
+    }
+
+    #[test]
+    fn a_cycle_has_its_eigenvalues_on_a_circle() {
+        // 1 - exp(2 pi i k / n); permutation matrices are where careless QR iterations never end.
+        for n in [3, 4, 7, 64] {
+            let arcs: Vec<_> = (0..n).map(|i| (i, (i + 1) % n)).collect();
+            let found = eigenvalues(&Graph::from_arcs(n, &arcs).laplacian()).expect("it settles");
+            assert_eq!(found.len(), n);
+            assert!(found.iter().all(|eigenvalue| close((1.0 - eigenvalue).norm(), 1.0)));
+            let k_1 = 1.0 - (std::f64::consts::TAU / n as f64).cos();
+            assert!(close(found[1].re, k_1), "{n}: {}", found[1]);
+        }
+    }
+
+    #[test]
+    fn connectivity_of_known_graphs() {
+        let path = Graph::from_edges(4, &[(0, 1), (1, 2), (2, 3)]);
+        assert!(close(lambda_2(&path).expect("two-way"), 2.0 - 2f64.sqrt()));
+        assert!(close(lambda_2(&Graph::complete(5)).expect("two-way"), 5.0));
+        assert!(close(lambda_2(&Graph::from_edges(4, &[(0, 1), (2, 3)])).expect("two-way"), 0.0));
+        assert_eq!((lambda_2(&Graph::empty(1)), lambda_2(&Graph::empty(0))), (None, None));
+    }
+
+    #[test]
+    fn erratum_4_6_the_closed_form_is_only_a_bound() {
+        let (graphs, gains) = (all_graphs(3), [1.0, 2.0, 4.0]);
+        assert!((lambda_m(&graphs, &gains).expect("some are connected") - 0.783_39).abs() < 5e-6);
+        assert!((lambda_m_lower_bound(&graphs, &gains).expect("some are connected") - 7.0 / 9.0).abs() < 1e-12);
+        let complete = [Graph::complete(3)];
+        let [truth, bound] = [lambda_m, lambda_m_lower_bound].map(|f| f(&complete, &gains).expect("connected"));
+        assert!(close(truth, bound) && close(truth, 3.0 * 7.0 / 9.0), "equal for the complete graph");
+    }
+
+    #[test]
+    fn equal_gains_leave_the_connectivity() {
+        let graphs = all_graphs(4);
+        let [a, b, c] = [lambda_m, lambda_2m, lambda_m_lower_bound].map(|f| f(&graphs, &[0.3; 4]).expect("connected"));
+        let path = 2.0 - 2f64.sqrt();
+        assert!(close(a, path) && close(b, path) && close(c, path), "the path is the least connected graph");
+    }
+
+    #[test]
+    fn what_cannot_be_answered_is_not() {
+        let path = [Graph::from_edges(3, &[(0, 1), (1, 2)])];
+        for gains in [&[1.0, 1.0][..], &[1.0, 0.0, 1.0], &[1.0, -1.0, 1.0], &[1.0, f64::NAN, 1.0], &[]] {
+            assert_eq!((lambda_m(&path, gains), lambda_m_lower_bound(&path, gains)), (None, None), "{gains:?}");
+        }
+        assert_eq!(lambda_m(&[Graph::empty(3)], &[1.0; 3]), None, "never connected");
+        assert_eq!(lambda_m(&[Graph::from_arcs(2, &[(0, 1)])], &[1.0; 2]), None, "one-way");
+        assert_eq!(lambda_m(&[Graph::complete(1)], &[1.0]), None, "nobody to disagree with");
+        assert_eq!(eigenvalues(&dmatrix![f64::NAN]), None);
+    }
+
+    #[test]
+    fn the_complement_of_an_axis_is_the_other_axes() {
+        assert_eq!(orthogonal_complement(&dvector![0.0, 3.0, 0.0]), dmatrix![1., 0.; 0., 0.; 0., 1.]);
+    }
+
+    /// A graph with two-way links, gains and a state, all of one size.
+    pub(crate) fn a_fleet() -> impl Strategy<Value = (Graph, Vec<f64>, DVector<f64>)> {
+        (2usize..7).prop_flat_map(|n| {
+            let edges = prop::collection::vec((0..n, 0..n), 1..2 * n);
+            let gains = prop::collection::vec(0.1..5.0f64, n);
+            let state = prop::collection::vec(-10.0..10.0f64, n);
+            (edges, gains, state)
+                .prop_map(move |(edges, gains, state)| (Graph::from_edges(n, &edges), gains, DVector::from_vec(state)))
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn lemma_4_1((graph, gains, gamma) in a_fleet()) {
+            let n = gains.len();
+            let (l_beta, beta, l) = (l_beta(&gains), beta(&gains), graph.laplacian());
+            let k = DMatrix::from_diagonal(&DVector::from_vec(gains.clone()));
+            let k_inverse = DMatrix::from_diagonal(&beta);
+            let ones = DVector::from_element(n, 1.0);
+            let error = &l_beta * &gamma;
+            // 1: a projection of rank n - 1 with these null vectors.
+            prop_assert!((&l_beta * &ones).amax() < 1e-12 && (beta.transpose() * &l_beta).amax() < 1e-12);
+            prop_assert!((&l_beta * &l_beta - &l_beta).amax() < 1e-12 && close(l_beta.trace(), n as f64 - 1.0));
+            // 2, 5 and 6.
+            prop_assert!((&l_beta * &k * &l - &k * &l).amax() < 1e-10);
+            prop_assert!(beta.dot(&error).abs() < 1e-10);
+            prop_assert!((&l * &error - &l * &gamma).amax() < 1e-10);
+            // 3, whose left side needs a transpose that the print misplaces (erratum 4.8).
+            let (of_error, of_state) = (error.dot(&(&k_inverse * &error)), gamma.dot(&(&k_inverse * &gamma)));
+            prop_assert!(of_error <= of_state * (1.0 + 1e-12));
+            // 4: equal states have no error, and only they.
+            prop_assert!((&l_beta * (&ones * 3.0)).amax() < 1e-12);
+            prop_assert!(error.norm() > 1e-9 || gamma.max() - gamma.min() < 1e-8);
+            // 7.
+            let size = error.norm() * (1.0 + 1e-12);
+            prop_assert!(gamma.max() - gamma.min() <= 2f64.sqrt() * size + 1e-12);
+            prop_assert!((&k * &l * &gamma).norm() <= n as f64 * size * k.amax() + 1e-12);
+            // 9.
+            let z = &l * &gamma;
+            for i in 0..n {
+                let heard: f64 = graph.neighbours(i).map(|j| gamma[i] - gamma[j]).sum();
+                prop_assert!((z[i] - heard).abs() < 1e-10);
+            }
+        }
+
+        #[test]
+        fn lemma_4_1_property_8_orders_its_rates((graph, gains, gamma) in a_fleet()) {
+            let graphs = [graph.clone()];
+            let Some(truth) = lambda_m(&graphs, &gains) else {
+                prop_assert!(!graph.is_connected());
+                return Ok(());
+            };
+            let bound = lambda_m_lower_bound(&graphs, &gains).unwrap_or(f64::NAN);
+            let connectivity = lambda_2m(&graphs, &gains).unwrap_or(f64::NAN);
+            let weighted = lambda_2_weighted(&graphs, &gains).unwrap_or(f64::NAN);
+            let k_m = gains.iter().copied().fold(f64::INFINITY, f64::min);
+            prop_assert!(0.0 < bound && bound <= truth + 1e-9 && truth <= connectivity + 1e-9);
+            prop_assert!(k_m * truth <= weighted + 1e-9);
+            // The inequality that the lemma is for, and the sharper one.
+            let error = l_beta(&gains) * &gamma;
+            let dissipation = error.dot(&(graph.laplacian() * &error));
+            prop_assert!(dissipation >= truth * error.norm_squared() - 1e-8);
+            let v_2 = 0.5 * error.dot(&error.component_mul(&beta(&gains)));
+            prop_assert!(dissipation >= 2.0 * weighted * v_2 - 1e-8);
+        }
+
+        #[test]
+        fn eigenvalues_sum_to_the_trace(arcs in prop::collection::vec((0usize..9, 0usize..9), 0..40)) {
+            let l = Graph::from_arcs(9, &arcs).laplacian();
+            let found = eigenvalues(&l).expect("it settles");
+            let sum: Complex<f64> = found.iter().sum();
+            prop_assert!((sum - l.trace()).norm() < 1e-9);
+            // Gershgorin: no eigenvalue of a Laplacian lies left of the imaginary axis. Defective ones are found
+            // only to the root of the rounding error.
+            prop_assert!(found.iter().all(|eigenvalue| eigenvalue.re > -1e-2));
+        }
+    }
+}
