@@ -98,6 +98,36 @@ impl Connectivity {
         self.phases().filter(|(up, _)| !up).fold(Span::ZERO, |lost, (_, lasts)| lost + lasts)
     }
 
+    /// The most time without connection in any window of this length within the run; in the whole run, if that is
+    /// shorter.
+    pub fn most_lost_in(&self, window: Span) -> Span {
+        let Some(start) = self.start else { return Span::ZERO };
+        let window = window.max(Span::ZERO);
+        // A worst window can be moved until it begins where a phase begins, or ends where one ends.
+        let bounds = || [start].into_iter().chain(self.toggles.iter().copied()).chain([self.now]);
+        let first = self.now - window;
+        let windows = bounds().map(|t| t.min(first)).chain(bounds().map(|t| t - window));
+        let (mut lost_before, mut lost) = (Vec::with_capacity(self.toggles.len() + 1), Span::ZERO);
+        for (up, lasts) in self.phases() {
+            lost_before.push(lost);
+            lost = lost + if up { Span::ZERO } else { lasts };
+        }
+        let lost_until = |t: Time| {
+            let phase = self.toggles.partition_point(|&toggle| toggle <= t);
+            let since = phase.checked_sub(1).map_or(start, |toggle| self.toggles[toggle]);
+            let connected = self.starts_connected ^ (phase % 2 == 1);
+            lost_before[phase] + if connected { Span::ZERO } else { t - since }
+        };
+        windows
+            .map(|from| from.max(start))
+            .map(|from| {
+                let to = (from + window).min(self.now);
+                Span::from_nanos(lost_until(to).nanos() - lost_until(from).nanos())
+            })
+            .max()
+            .unwrap_or(Span::ZERO)
+    }
+
     /// Part of the time without connection, in \[0, 1\]; zero before anything was measured.
     pub fn loss_fraction(&self) -> f64 {
         let length = self.length().secs();
@@ -360,6 +390,27 @@ mod tests {
             }
             let measured = measure(&durations).t_0(alpha).secs();
             prop_assert!((measured - sup / (1.0 - alpha)).abs() < 1e-6, "{} {}", measured, sup);
+        }
+
+        #[test]
+        fn no_sliding_window_loses_more_than_the_worst(durations in a_run(), length in 0.1..20.0f64) {
+            let run = measure(&durations);
+            let worst = run.most_lost_in(s(length)).secs();
+            let end = run.length().secs();
+            let length = length.min(end);
+            let lost_in = |from: f64| {
+                let mut begins = 0.0;
+                let overlaps = durations.iter().enumerate().map(|(index, lasts)| {
+                    let overlap = (begins + lasts).min(from + length) - f64::max(begins, from);
+                    begins += lasts;
+                    if index % 2 == 1 { 0.0 } else { overlap.max(0.0) }
+                });
+                overlaps.sum::<f64>()
+            };
+            let slid = (0..=200).map(|step| lost_in((end - length) * f64::from(step) / 200.0)).fold(0.0, f64::max);
+            prop_assert!(slid <= worst + 1e-6, "{} {}", slid, worst);
+            // On so fine a grid the worst window is missed by at most one step.
+            prop_assert!(worst <= slid + (end - length) / 200.0 + 1e-6);
         }
 
         #[test]

@@ -2,7 +2,7 @@
 //!
 //! Where gains are asked for, they are the k_i > 0 of K = diag(k_i), one per vehicle; β := K⁻¹1.
 
-use nalgebra::{Complex, DMatrix, DVector, Schur};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::Graph;
 
@@ -17,20 +17,91 @@ pub fn symmetric_eigenvalues(matrix: &DMatrix<f64>) -> Vec<f64> {
     eigenvalues
 }
 
-/// Eigenvalues of any square matrix, by real part and then by imaginary part; `None` if the iteration that looks for
-/// them does not settle (or the matrix holds something that is not a number).
+/// Eigenvalues of any square matrix, by real part and then by imaginary part; `None` if it holds something that is not
+/// a finite number (or should the iteration that looks for them not settle, which has not been seen).
+///
+/// Laplacians of one-way networks often have many equal eigenvalues and few eigenvectors; the real Schur decomposition
+/// of nalgebra 0.35 does not end on some of them and gives NaN for others. This is the textbook's complex QR iteration.
 pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if !matrix.is_square() || matrix.iter().any(|entry| !entry.is_finite()) {
         return None;
     }
-    if matrix.is_empty() {
-        return Some(Vec::new());
+    let mut eigenvalues = match matrix.nrows() {
+        0 | 1 => matrix.iter().map(|&entry| Complex::from(entry)).collect(),
+        _ => hessenberg_eigenvalues(matrix.clone().hessenberg().unpack_h().map(Complex::from))?,
+    };
+    // A complex iteration leaves rounding errors where a real eigenvalue has no imaginary part.
+    let rounding = matrix.norm() * matrix.nrows() as f64 * f64::EPSILON;
+    for eigenvalue in eigenvalues.iter_mut().filter(|eigenvalue| eigenvalue.im.abs() <= rounding) {
+        eigenvalue.im = 0.0;
     }
-    let most_steps = 100 * matrix.nrows();
-    let schur = Schur::try_new(matrix.clone(), f64::EPSILON, most_steps)?;
-    let mut eigenvalues: Vec<Complex<f64>> = schur.complex_eigenvalues().iter().copied().collect();
     eigenvalues.sort_unstable_by(|a, b| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
     Some(eigenvalues)
+}
+
+/// QR iteration with Wilkinson's shift on a Hessenberg matrix, splitting off eigenvalues at its end.
+fn hessenberg_eigenvalues(mut h: DMatrix<Complex<f64>>) -> Option<Vec<Complex<f64>>> {
+    /// Steps for one eigenvalue; two or three are usual.
+    const MOST_STEPS: usize = 300;
+    let negligible = h.norm() * f64::EPSILON;
+    let (mut last, mut steps) = (h.nrows() - 1, 0);
+    while last > 0 {
+        let first = (1..=last).rev().find(|&k| h[(k, k - 1)].norm() <= negligible).unwrap_or(0);
+        if first == last {
+            (last, steps) = (last - 1, 0);
+            continue;
+        }
+        if steps == MOST_STEPS {
+            return None;
+        }
+        steps += 1;
+        // An odd shift now and then, against cycles.
+        let shift = if steps % 10 == 0 {
+            h[(last, last)] + h[(last, last - 1)].norm()
+        } else {
+            wilkinson_shift(h[(last - 1, last - 1)], h[(last - 1, last)], h[(last, last - 1)], h[(last, last)])
+        };
+        qr_step(&mut h, first, last, shift);
+    }
+    Some(h.diagonal().iter().copied().collect())
+}
+
+/// The eigenvalue of \[a b; c d\] that is nearer to d.
+fn wilkinson_shift(a: Complex<f64>, b: Complex<f64>, c: Complex<f64>, d: Complex<f64>) -> Complex<f64> {
+    let half = (a - d) * 0.5;
+    let root = (half * half + b * c).sqrt();
+    let farther = if (half + root).norm() >= (half - root).norm() { half + root } else { half - root };
+    // The two differences from d multiply to -bc: dividing by the larger one loses no digits.
+    if farther.norm() > 0.0 { d - b * c / farther } else { d }
+}
+
+/// H − σI = QR, then H := RQ + σI, on the rows and columns first..=last.
+fn qr_step(h: &mut DMatrix<Complex<f64>>, first: usize, last: usize, shift: Complex<f64>) {
+    for k in first..=last {
+        h[(k, k)] -= shift;
+    }
+    let mut rotations = Vec::with_capacity(last - first);
+    for k in first..last {
+        let (a, b) = (h[(k, k)], h[(k + 1, k)]);
+        let length = a.norm().hypot(b.norm());
+        let (c, s) = if length > 0.0 { (a / length, b / length) } else { (Complex::from(1.0), Complex::from(0.0)) };
+        rotations.push((c, s));
+        for column in k..=last {
+            let (upper, lower) = (h[(k, column)], h[(k + 1, column)]);
+            h[(k, column)] = c.conj() * upper + s.conj() * lower;
+            h[(k + 1, column)] = c * lower - s * upper;
+        }
+    }
+    for (k, (c, s)) in (first..last).zip(rotations) {
+        for row in first..=k + 1 {
+            let (left, right) = (h[(row, k)], h[(row, k + 1)]);
+            h[(row, k)] = left * c + right * s;
+            h[(row, k + 1)] = right * c.conj() - left * s.conj();
+        }
+    }
+    for k in first..=last {
+        h[(k, k)] += shift;
+    }
 }
 
 /// λ_2, the connectivity of a graph with two-way links: the second smallest eigenvalue of L, positive iff connected.
@@ -166,6 +237,32 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_nearly_defective_laplacian_settles_too() {
+        // Implicit real QR iterations have been seen to circle for ever on this one.
+        let arcs = [(2, 7), (6, 1), (6, 3), (5, 8), (1, 6), (5, 1), (8, 2), (8, 6), (3, 0), (4, 7)];
+        let l = Graph::from_arcs(9, &arcs).laplacian();
+        let found = eigenvalues(&l).expect("it settles");
+        // 0 and 7 listen to nobody; without 1 and 6, who hear each other, everybody's own degree is an eigenvalue.
+        let mut expected = vec![0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0];
+        let golden = (3.0 - 5f64.sqrt()) / 2.0;
+        expected.extend([golden, 3.0 - golden]);
+        expected.sort_by(f64::total_cmp);
+        for (eigenvalue, expected) in found.iter().zip(expected) {
+            assert!((eigenvalue - expected).norm() < 1e-4, "{eigenvalue} {expected}");
+        }
+    }
+
+    #[test]
+    fn equal_eigenvalues_are_numbers() {
+        // 2 hears three, 7 and 8 hear one each: a triangular Laplacian with its degrees as eigenvalues.
+        let l = Graph::from_arcs(9, &[(7, 6), (2, 5), (8, 7), (2, 0), (2, 3)]).laplacian();
+        let found = eigenvalues(&l).expect("it settles");
+        for (eigenvalue, expected) in found.iter().zip([0., 0., 0., 0., 0., 0., 1., 1., 3.]) {
+            assert!((eigenvalue - expected).norm() < 1e-7, "{eigenvalue} {expected}");
+        }
+    }
+
+    #[test]
     fn connectivity_of_known_graphs() {
         let path = Graph::from_edges(4, &[(0, 1), (1, 2), (2, 3)]);
         assert!(close(lambda_2(&path).expect("two-way"), 2.0 - 2f64.sqrt()));
@@ -281,6 +378,8 @@ pub(crate) mod tests {
             let found = eigenvalues(&l).expect("it settles");
             let sum: Complex<f64> = found.iter().sum();
             prop_assert!((sum - l.trace()).norm() < 1e-9);
+            let squares: Complex<f64> = found.iter().map(|eigenvalue| eigenvalue * eigenvalue).sum();
+            prop_assert!((squares - (&l * &l).trace()).norm() < 1e-8);
             // Gershgorin: no eigenvalue of a Laplacian lies left of the imaginary axis. Defective ones are found
             // only to the root of the rounding error.
             prop_assert!(found.iter().all(|eigenvalue| eigenvalue.re > -1e-2));

@@ -1,0 +1,233 @@
+//! Theorem 4.4: coordination under brief connectivity losses (Definition 4.3).
+//!
+//! While the graph is connected, V_2 = ½ γ~'K⁻¹γ~ decays at 2k_mλ_m; while it is not, at least it does not grow (type
+//! II). The theorem's rates are those of such quadratic functions; norms decay at half of them (erratum 4.4). λ_m
+//! is computed and not taken from its closed form (erratum 4.6). Links work both ways.
+
+use super::{Gains, PathFollowing, Verdict};
+use crate::graph::Graph;
+use crate::graph::spectrum::{lambda_2_weighted, lambda_m};
+use crate::time::Span;
+
+/// The coordination subsystem and its network.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coordination {
+    /// Number of vehicles and bounds of their gains.
+    pub gains: Gains,
+    /// λ_m of Lemma 4.1, property 8, over the connected graphs that occur.
+    #[doc(alias = "λ_m")]
+    pub lambda_m: f64,
+    /// The least λ_2(K^½LK^½) over them: what k_mλ_m is a lower bound of.
+    pub lambda_2_weighted: f64,
+    /// α: the asymptotic connectivity loss rate (4.11).
+    #[doc(alias = "α")]
+    pub alpha: f64,
+}
+
+impl Coordination {
+    /// From the graphs that occur, of which those that are connected count; `None` if none is, if one has one-way
+    /// links, or if the gains do not fit.
+    pub fn new(graphs: &[Graph], gains: &[f64], alpha: f64) -> Option<Coordination> {
+        Some(Coordination {
+            gains: Gains::new(gains)?,
+            lambda_m: lambda_m(graphs, gains)?,
+            lambda_2_weighted: lambda_2_weighted(graphs, gains)?,
+            alpha,
+        })
+    }
+
+    /// k_mλ_m \[1/s\].
+    fn speed(&self) -> f64 {
+        self.gains.k_m * self.lambda_m
+    }
+
+    /// k_g := λ_m²k_m³/(n²k_M³).
+    pub fn k_g(&self) -> f64 {
+        let Gains { n, k_m, k_max } = self.gains;
+        (self.lambda_m / n as f64).powi(2) * (k_m / k_max).powi(3)
+    }
+
+    /// λ_0 = λ~_0 − √(λ~_0² − k_mλ_mλ_1(1 − ρ_1/(k_g α_1 λ_1))),  λ~_0 = ½(λ_1 + k_mλ_m).
+    #[doc(alias = "λ_0")]
+    pub fn lambda_0(&self, lambda_1: f64, rho_1: f64, alpha_1: f64) -> f64 {
+        let middle = 0.5 * (lambda_1 + self.speed());
+        let coupling = 1.0 - rho_1 / (self.k_g() * alpha_1 * lambda_1);
+        middle - (middle.powi(2) - self.speed() * lambda_1 * coupling).max(0.0).sqrt()
+    }
+
+    /// The loss rate below which the theorem holds: λ_0/(2k_mλ_m) for type I, 1 for type II.
+    pub fn alpha_limit(&self, following: PathFollowing) -> f64 {
+        match following {
+            PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => {
+                self.lambda_0(lambda_1, rho_1, alpha_1) / (2.0 * self.speed())
+            }
+            PathFollowing::TypeII { .. } => 1.0,
+        }
+    }
+
+    /// Whether the theorem's conditions hold.
+    pub fn holds(&self, following: PathFollowing) -> bool {
+        let weakly_coupled = match following {
+            PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => rho_1 / (alpha_1 * lambda_1) < self.k_g(),
+            PathFollowing::TypeII { lambda_1 } => lambda_1 > 0.0,
+        };
+        weakly_coupled && self.alpha >= 0.0 && self.alpha < self.alpha_limit(following)
+    }
+
+    /// λ: the rate at which the Lyapunov function of the whole fleet decays \[1/s\], if the conditions hold.
+    ///
+    /// λ_0 − 2αk_mλ_m for type I, min(λ_1, 2(1 − α)k_mλ_m) for type II.
+    /// (If those two are equal, every smaller rate: the cascade then decays like t e^{−λt}.)
+    pub fn rate_of_v(&self, following: PathFollowing) -> Option<f64> {
+        let rate = match following {
+            PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => {
+                self.lambda_0(lambda_1, rho_1, alpha_1) - 2.0 * self.alpha * self.speed()
+            }
+            PathFollowing::TypeII { lambda_1 } => lambda_1.min(2.0 * (1.0 - self.alpha) * self.speed()),
+        };
+        self.holds(following).then_some(rate)
+    }
+
+    /// λ/2: the rate at which the errors themselves decay \[1/s\] (erratum 4.4).
+    pub fn rate_of_norm(&self, following: PathFollowing) -> Option<f64> {
+        self.rate_of_v(following).map(|rate| 0.5 * rate)
+    }
+
+    /// (1 − α)k_mλ_m: the rate at which ‖γ~‖ alone decays with path following of type II \[1/s\], which then disturbs
+    /// it in no way.
+    pub fn rate_of_agreement(&self) -> f64 {
+        (1.0 - self.alpha) * self.speed()
+    }
+
+    /// (1 − α)λ_2(K^½LK^½): the same, sharper for unequal gains \[1/s\].
+    ///
+    /// With x = K^{−½}γ~ and β'γ~ = 0, x is orthogonal to the kernel of K^½LK^½, so V_2' = −x'K^½LK^½x ≤ −2λ_2 V_2.
+    pub fn sharper_rate_of_agreement(&self) -> f64 {
+        (1.0 - self.alpha) * self.lambda_2_weighted
+    }
+
+    /// √c with c = e^{2k_mλ_m(1 − α)T_0} (4.20) and the bounds of V_2 by norms: by how much ‖γ~‖ can exceed its decay at
+    /// [`Coordination::rate_of_agreement`].
+    ///
+    /// ‖γ~(t)‖ ≤ √(k_M/k_m) e^{(1 − α)k_mλ_m(T_0 − (t − t_0))} ‖γ~(t_0)‖.
+    pub fn overshoot(&self, t_0: Span) -> f64 {
+        (self.gains.k_max / self.gains.k_m).sqrt() * (self.rate_of_agreement() * t_0.secs()).exp()
+    }
+
+    /// What the theorem says of this fleet.
+    pub fn verdict(&self, following: PathFollowing) -> Verdict {
+        let (name, condition, coupling) = match following {
+            PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => (
+                "Theorem 4.4 (type I)",
+                format!("α < {:.4}, ρ_1/(α_1λ_1) < {:.6}", self.alpha_limit(following), self.k_g()),
+                format!(", ρ_1/(α_1λ_1) = {:.6}", rho_1 / (alpha_1 * lambda_1)),
+            ),
+            PathFollowing::TypeII { .. } => ("Theorem 4.4 (type II)", "α < 1".to_owned(), String::new()),
+        };
+        Verdict {
+            name,
+            condition,
+            value: format!("α = {:.4}{coupling}, λ_m = {:.5}", self.alpha, self.lambda_m),
+            holds: self.holds(following),
+            norm_rate: self.rate_of_norm(following),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Coordination;
+    use crate::graph::Graph;
+    use crate::graph::measure::Connectivity;
+    use crate::graph::spectrum::l_beta;
+    use crate::graph::spectrum::tests::{a_fleet, all_graphs};
+    use crate::graph::switching::Switching;
+    use crate::random::Stream;
+    use crate::theory::PathFollowing::{TypeI, TypeII};
+    use crate::time::{Span, Time};
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    fn remark_4_2(alpha: f64) -> Coordination {
+        Coordination::new(&all_graphs(3), &[1.0; 3], alpha).expect("some graphs are connected")
+    }
+    fn close(a: Option<f64>, b: f64) -> bool {
+        a.is_some_and(|a| (a - b).abs() < 1e-9)
+    }
+
+    #[test]
+    fn remark_4_2_numbers() {
+        let fleet = remark_4_2(0.2);
+        assert!((fleet.lambda_m - 1.0).abs() < 1e-12 && (fleet.k_g() - 1.0 / 9.0).abs() < 1e-12);
+        let type_i = |rho_1| TypeI { lambda_1: 1.0, rho_1, alpha_1: 0.5 };
+        let type_ii = TypeII { lambda_1: 1.0 };
+        // The printed rates are those of V; norms have half (erratum 4.4).
+        assert!(close(fleet.rate_of_v(type_i(1.0 / 72.0)), 0.1) && close(fleet.rate_of_v(type_ii), 1.0));
+        assert!(close(fleet.rate_of_norm(type_i(1.0 / 72.0)), 0.05) && close(fleet.rate_of_norm(type_ii), 0.5));
+        // rho_1 < 1/18 and alpha < (1 - sqrt(18 rho_1))/2.
+        for rho_1 in [0.0, 0.01, 0.04, 0.055] {
+            let limit = fleet.alpha_limit(type_i(rho_1));
+            assert!((limit - (1.0 - (18.0 * rho_1).sqrt()) / 2.0).abs() < 1e-9, "{rho_1}: {limit}");
+        }
+        let connected = remark_4_2(0.0);
+        assert!(connected.holds(type_i(0.999 / 18.0)) && !connected.holds(type_i(1.001 / 18.0)));
+        assert!(remark_4_2(0.499).holds(type_i(0.0)) && !remark_4_2(0.501).holds(type_i(0.0)), "at best one half");
+        assert!(remark_4_2(0.999).holds(type_ii) && !remark_4_2(1.0).holds(type_ii));
+    }
+
+    #[test]
+    fn section_4_6_decays_at_a_fortieth() {
+        let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        let fleet = Coordination::new(&[star, Graph::empty(3)], &[0.1; 3], 0.75).expect("connected");
+        assert!((fleet.rate_of_agreement() - 0.025).abs() < 1e-12);
+        let verdict = fleet.verdict(TypeII { lambda_1: 1.0 });
+        assert!(verdict.holds && close(verdict.norm_rate, 0.025));
+        assert!(verdict.value.contains("α = 0.7500"));
+    }
+
+    #[test]
+    fn what_does_not_hold_has_no_rate() {
+        let fleet = remark_4_2(0.3);
+        for following in [TypeI { lambda_1: 1.0, rho_1: 1.0, alpha_1: 0.5 }, TypeII { lambda_1: 0.0 }] {
+            let verdict = fleet.verdict(following);
+            assert_eq!((verdict.holds, verdict.norm_rate), (false, None), "{verdict:?}");
+        }
+        assert!(!remark_4_2(f64::NAN).holds(TypeII { lambda_1: 1.0 }));
+        assert!(Coordination::new(&[Graph::empty(3)], &[1.0; 3], 0.0).is_none());
+        assert!(Coordination::new(&[Graph::complete(1)], &[1.0], 0.0).is_none());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn errors_decay_at_least_as_promised(
+            (graph, gains, gamma) in a_fleet(), alpha in 0.1..0.9f64, t_0 in 0.2..4.0f64, seed in any::<u64>()
+        ) {
+            let Some(fleet) = Coordination::new(std::slice::from_ref(&graph), &gains, alpha) else { return Ok(()) };
+            prop_assert!(fleet.sharper_rate_of_agreement() >= fleet.rate_of_agreement() - 1e-9);
+            let arcs: Vec<_> = graph.arcs().collect();
+            let t_0 = Span::from_secs(t_0);
+            let mut signal = Switching::random(arcs.len(), alpha, t_0, Span::from_secs(0.05), Stream::new(seed, "p"));
+            let end = Time::from_secs(20.0);
+            // What was measured promises no less than what was asked for.
+            let measured = Connectivity::planned(signal.clone(), graph.len(), &arcs, end);
+            let overshoot = fleet.overshoot(measured.t_0(alpha));
+            let k = DMatrix::from_diagonal(&DVector::from_vec(gains.clone()));
+            let flow = -(&k * graph.laplacian());
+            let l_beta = l_beta(&gains);
+            let start = (&l_beta * &gamma).norm();
+            let (mut gamma, mut t) = (gamma, Time::ZERO);
+            while t < end {
+                let next = signal.next_change_after(t).unwrap_or(end).min(end);
+                if signal.is_up(0, t) {
+                    // Exactly, phase by phase: gamma' = -K L gamma.
+                    gamma = (&flow * (next - t).secs()).exp() * gamma;
+                }
+                t = next;
+                let promised = overshoot * (-fleet.rate_of_agreement() * t.secs()).exp() * start;
+                let left = (&l_beta * &gamma).norm();
+                prop_assert!(left <= promised * (1.0 + 1e-9) + 1e-9, "{} {} at {}", left, promised, t);
+            }
+        }
+    }
+}
