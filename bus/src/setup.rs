@@ -181,13 +181,14 @@ fn router_config(endpoint: &Endpoint, rules: &[Rule]) -> Result<Config> {
     common_config(&settings)
 }
 
-/// A participant's session towards `endpoint`; opening it gives up after `timeout`.
+/// A participant's session towards `endpoint`; opening it tries once, and gives up on a silent peer after `timeout`.
 pub(crate) fn client_config(endpoint: &Endpoint, timeout: Duration) -> Result<Config> {
     let settings = [
         ("mode", r#""client""#.to_owned()),
         ("connect/endpoints", format!(r#"["{endpoint}"]"#)),
-        ("connect/timeout_ms", timeout.as_millis().to_string()),
-        ("connect/retry", "{period_init_ms: 50, period_max_ms: 500, period_increase_factor: 2}".to_owned()),
+        // Trying again is the caller's business: it can be called off.
+        ("connect/timeout_ms", "0".to_owned()),
+        ("transport/unicast/open_timeout", timeout.as_millis().to_string()),
     ];
     common_config(&settings)
 }
