@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use bus::Plane;
 use bus::clock::sharpen_this_thread;
 use bus::line::{Line, LineConfig, LineEvent};
-use bus::setup::Endpoint;
+use bus::setup::{Endpoint, share_one_runtime};
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -23,6 +23,8 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 const MESSAGE: [u8; 64] = [7; 64];
 
 fn main() -> Outcome {
+    // `ZENOH_RUNTIME='()'` in the environment measures without it.
+    share_one_runtime();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     sharpen_this_thread();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {

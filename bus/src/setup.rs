@@ -9,13 +9,14 @@
 //! | TCP window and queues left alone, 16 batches for the two planes | a burst must not become a loss |
 //! | at most 64 KiB per message received | the default is 1 GiB |
 //!
-//! Sessions run on Zenoh's own runtime, so everything here is called from plain threads and from no async runtime.
-//! Each process then has 8 to 9 threads; `ZENOH_RUNTIME`, which Zenoh reads once from the environment, can lower that
-//! to 4: `(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:2))`.
+//! Sessions run on Zenoh's own threads, so everything here is called from plain threads and from no async runtime.
+//! [`share_one_runtime`] halves those threads.
 
 use std::fmt;
 use std::io::ErrorKind;
 use std::net::{TcpListener, TcpStream, ToSocketAddrs};
+use std::os::unix::process::CommandExt;
+use std::process::Command;
 use std::str::FromStr;
 use std::sync::mpsc;
 use std::time::Duration;
@@ -28,6 +29,30 @@ use crate::plane::{Plane, down_key, hub_token, join_key, participant_token, up_k
 /// How long either side stays silent before the other holds it for dead. Death by `kill` is seen at once; this is for
 /// frozen machines and cut cables, and shorter than two seconds a loaded machine would be held for dead too.
 pub const LEASE: Duration = Duration::from_secs(2);
+
+/// Zenoh keeps five runtimes with a thread or two each; this hands all their work to one with two threads. Two, so that
+/// one that is busy does not hold up the signs of life.
+const ONE_RUNTIME: &str =
+    "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:2))";
+
+/// Gives this process half the threads and about a seventh less processor time per message; delays stay as they are.
+///
+/// To be called first in `main`. Zenoh takes this setting only from the environment variable `ZENOH_RUNTIME`, which a
+/// running process cannot change safely; so the process replaces itself by itself with the variable set, keeping its
+/// identity and arguments. It does nothing if the variable is set already, and goes on as it is where it cannot.
+pub fn share_one_runtime() {
+    const VARIABLE: &str = "ZENOH_RUNTIME";
+    if std::env::var_os(VARIABLE).is_some() {
+        return;
+    }
+    let mut arguments = std::env::args_os();
+    let name = arguments.next().unwrap_or_default();
+    let failure = match std::env::current_exe() {
+        Ok(program) => Command::new(program).arg0(name).args(arguments).env(VARIABLE, ONE_RUNTIME).exec(),
+        Err(error) => error,
+    };
+    tracing::debug!("this process keeps its many threads: {failure}");
+}
 
 /// A TCP address, `tcp/HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -181,13 +206,14 @@ fn router_config(endpoint: &Endpoint, rules: &[Rule]) -> Result<Config> {
     common_config(&settings)
 }
 
-/// A participant's session towards `endpoint`; opening it gives up after `timeout`.
+/// A participant's session towards `endpoint`; opening it tries once, and gives up on a silent peer after `timeout`.
 pub(crate) fn client_config(endpoint: &Endpoint, timeout: Duration) -> Result<Config> {
     let settings = [
         ("mode", r#""client""#.to_owned()),
         ("connect/endpoints", format!(r#"["{endpoint}"]"#)),
-        ("connect/timeout_ms", timeout.as_millis().to_string()),
-        ("connect/retry", "{period_init_ms: 50, period_max_ms: 500, period_increase_factor: 2}".to_owned()),
+        // Trying again is the caller's business: it can be called off.
+        ("connect/timeout_ms", "0".to_owned()),
+        ("transport/unicast/open_timeout", timeout.as_millis().to_string()),
     ];
     common_config(&settings)
 }

@@ -25,6 +25,8 @@ use crate::setup::{self, Endpoint, LEASE};
 
 /// How long [`Switchboard::close`] waits for participants to take what was sent to them.
 const FAREWELL: Duration = Duration::from_secs(1);
+/// How long a line that is out of service keeps its session, so that the two ends do not close it at once.
+const REST: Duration = Duration::from_millis(500);
 /// Another process may take a port between its being found free and its being listened on.
 const PORT_TRIES: usize = 10;
 
@@ -170,6 +172,7 @@ impl Switchboard {
             by_id: HashMap::new(),
             sessions: HashMap::new(),
             admissions: 0,
+            retired: Vec::new(),
         };
         let clerk = std::thread::Builder::new()
             .name("bus-clerk".into())
@@ -264,6 +267,8 @@ struct Clerk {
     by_id: HashMap<String, LineId>,
     sessions: HashMap<LineId, LineSession>,
     admissions: u64,
+    /// The threads that close sessions which are out of service; dropping the sender wakes one from its rest.
+    retired: Vec<(Sender<()>, JoinHandle<()>)>,
 }
 
 /// One admission: the session behind a port.
@@ -276,7 +281,25 @@ struct LineSession {
     opened: Instant,
     session: Session,
     inbox: Arc<Inbox<HubEvent>>,
-    _hub_token: LivelinessToken,
+    hub_token: LivelinessToken,
+}
+
+impl LineSession {
+    /// Closes the session. The sign of life goes with it and not before: a participant that saw it vanish would close
+    /// its end at the same moment, and two closings that meet make a task of Zenoh 1.10.2 panic.
+    fn close(self) {
+        let LineSession { session, hub_token, .. } = self;
+        setup::close(session);
+        drop(hub_token);
+    }
+
+    /// Closes a session whose participant is leaving or has left: it first lets the other end close.
+    fn retire(self, resting: &Receiver<()>) {
+        let LineSession { session, hub_token, .. } = self;
+        drop(hub_token);
+        let _ = resting.recv_timeout(REST);
+        setup::close(session);
+    }
 }
 
 impl Clerk {
@@ -299,9 +322,13 @@ impl Clerk {
                                 // The program may listen no more: it hears of the end if its queue has room.
                                 let _ = self.events.try_send(HubEvent::Left { line });
                             }
-                            scope.spawn(move || setup::close(session));
+                            scope.spawn(move || session.close());
                         }
                     });
+                    for (rest, closer) in self.retired.drain(..) {
+                        drop(rest);
+                        let _ = closer.join();
+                    }
                     let _ = done.send(());
                     return;
                 }
@@ -366,21 +393,26 @@ impl Clerk {
 
     /// Ends a line's session; its participant may come back.
     fn retire(&mut self, line: LineId) {
-        if let Some((session, was_open)) = self.unplug(line) {
-            if was_open {
-                let _ = self.events.send(HubEvent::Left { line });
-            }
-            let _ = std::thread::Builder::new().name("bus-retire".into()).spawn(|| setup::close(session));
+        let Some((session, was_open)) = self.unplug(line) else { return };
+        if was_open {
+            let _ = self.events.send(HubEvent::Left { line });
+        }
+        self.retired.retain(|(_, closer)| !closer.is_finished());
+        let (rest, resting) = mpsc::channel();
+        let closer = std::thread::Builder::new().name("bus-retire".into()).spawn(move || session.retire(&resting));
+        if let Ok(closer) = closer {
+            self.retired.push((rest, closer));
         }
     }
 
     /// Takes a line's session out of service; true if its participant had joined.
-    fn unplug(&mut self, line: LineId) -> Option<(Session, bool)> {
-        let LineSession { session, inbox, .. } = self.sessions.remove(&line)?;
+    fn unplug(&mut self, line: LineId) -> Option<(LineSession, bool)> {
+        let session = self.sessions.remove(&line)?;
         if let Some(line) = self.lines.get(line) {
             line.set_inbox(None);
         }
-        Some((session, inbox.close()))
+        let was_open = session.inbox.close();
+        Some((session, was_open))
     }
 
     fn open_line(&mut self, line: LineId, id: &str, nonce: u64) -> Result<LineSession> {
@@ -439,17 +471,9 @@ impl Clerk {
             .background()
             .wait()
             .map_err(Error::middleware)?;
-        let token = session.liveliness().declare_token(hub_token(id)).wait().map_err(Error::middleware)?;
+        let hub_token = session.liveliness().declare_token(hub_token(id)).wait().map_err(Error::middleware)?;
 
         hub_line.set_inbox(Some(Arc::clone(&inbox)));
-        Ok(LineSession {
-            admission,
-            nonce,
-            port: endpoint.port(),
-            opened: Instant::now(),
-            session,
-            inbox,
-            _hub_token: token,
-        })
+        Ok(LineSession { admission, nonce, port: endpoint.port(), opened: Instant::now(), session, inbox, hub_token })
     }
 }
