@@ -54,6 +54,7 @@ pub struct MessageRow {
     pub t_ns: i64,
     pub from: String,
     pub to: String,
+    /// Number of the message on its link, from 0.
     pub seq: u64,
     /// When the emulator took it.
     pub sent_ns: i64,

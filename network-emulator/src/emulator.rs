@@ -56,8 +56,9 @@ pub struct Emulator {
     /// Orders messages that are due at the same instant.
     counter: u64,
     garbage: Vec<GarbageCount>,
-    /// With a real clock the achieved delay is recorded beside the commanded one.
-    watch_delays: bool,
+    /// With a real clock the achieved delay is recorded beside the commanded one: mission seconds per second of wall
+    /// clock.
+    watch_delays: Option<f64>,
     outputs: VecDeque<Channel>,
 }
 
@@ -78,7 +79,8 @@ struct UnderWay {
     due: Time,
     order: u64,
     link: usize,
-    seq: u32,
+    /// Number of the message on its link, from 0.
+    number: u64,
     sent: Time,
     bytes: Arc<[u8]>,
 }
@@ -97,7 +99,7 @@ impl PartialOrd for UnderWay {
 
 impl Emulator {
     /// The network of a mission at its start.
-    pub fn new(mission: Arc<Mission>, watch_delays: bool) -> Emulator {
+    pub fn new(mission: Arc<Mission>, watch_delays: Option<f64>) -> Emulator {
         let id = |i: usize| &mission.vehicles[i].id;
         let mut out = vec![Vec::new(); mission.vehicles.len()];
         let mut links = Vec::with_capacity(mission.links.len());
@@ -185,11 +187,12 @@ impl Emulator {
                 return Err(Garbage::Stale);
             }
             link.newest = Some(state.seq);
+            let number = link.ledger.sent;
             link.ledger.take();
             let due = now + Self::delay(link, state.seq);
             let order = self.counter;
             self.counter += 1;
-            let message = UnderWay { due, order, link: index, seq: state.seq, sent: now, bytes: bytes.clone() };
+            let message = UnderWay { due, order, link: index, number, sent: now, bytes: bytes.clone() };
             if link.stream.unit_at(u64::from(state.seq), 0) < link.loss {
                 self.settle(now, &message, Fate::Lost);
             } else if link.ledger.in_flight > self.mission.queue as u64 {
@@ -222,7 +225,7 @@ impl Emulator {
             t_ns: t.nanos(),
             from: self.mission.vehicles[link.from].id.clone(),
             to: self.mission.vehicles[link.to].id.clone(),
-            seq: u64::from(message.seq),
+            seq: message.number,
             sent_ns: message.sent.nanos(),
             due_ns: message.due.nanos(),
             fate,
@@ -239,14 +242,14 @@ impl Emulator {
         }
         self.settle(message.due, &message, Fate::Delivered);
         let link = &self.links[message.link];
-        if self.watch_delays {
+        if let Some(speed_up) = self.watch_delays {
             let row = AchievedRow {
                 t_ns: message.due.nanos(),
                 from: self.mission.vehicles[link.from].id.clone(),
                 to: self.mission.vehicles[link.to].id.clone(),
-                seq: u64::from(message.seq),
+                seq: message.number,
                 commanded_ns: (message.due - message.sent).nanos(),
-                late_ns: (now - message.due).nanos(),
+                late_ns: ((now - message.due).nanos() as f64 / speed_up) as i64,
             };
             self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Achieved(row))));
         }

@@ -296,7 +296,7 @@ impl Hub {
             }
         }
         self.load = Some(Load {
-            emulator: Emulator::new(mission.clone(), false),
+            emulator: Emulator::new(mission.clone(), None),
             mission,
             phase: Phase::Armed,
             clock: None,
@@ -518,10 +518,14 @@ impl Hub {
 
     fn clock_started(&mut self, now: Time, clock: ClockPlan) {
         let Some(load) = &mut self.load else { return };
-        let real = matches!(clock, ClockPlan::Real { .. });
+        let speed_up = match clock {
+            ClockPlan::Real { speed_up, .. } => Some(speed_up),
+            ClockPlan::Stepped => None,
+        };
+        let real = speed_up.is_some();
         load.phase = Phase::Running;
         load.clock = Some(clock);
-        load.emulator = Emulator::new(load.mission.clone(), real);
+        load.emulator = Emulator::new(load.mission.clone(), speed_up);
         load.lockstep = (!real).then(|| Lockstep::new(&load.mission));
         let (mission, fresh) = (Opened(load.mission.clone()), !load.adopted);
         self.outputs.push_back(HubOutput::OpenLog { mission, fresh });

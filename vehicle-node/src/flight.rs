@@ -49,11 +49,15 @@ pub struct Flight {
     /// The next control period to run, and the last one run.
     next: i64,
     last: Option<i64>,
+    /// Number of the next message.
+    next_message: i64,
     over: bool,
     /// Waits for the first neighbour to place its virtual target (a vehicle that comes back).
     rejoining: bool,
     /// Deadlines since the last report; only with a real clock.
     deadlines: Option<Deadlines>,
+    /// Mission seconds per second of wall clock.
+    speed_up: f64,
     outputs: VecDeque<FlightOutput>,
 }
 
@@ -65,26 +69,39 @@ struct Deadlines {
 }
 
 impl Flight {
-    /// A flight from the mission's start.
+    /// A flight from the mission's start. With a real clock, of which `speed_up` is the mission seconds per second of
+    /// wall clock, deadlines are watched.
     ///
     /// # Errors
     /// Why the vehicle cannot be built.
-    pub fn new(mission: Arc<Mission>, me: usize, watch_deadlines: bool) -> Result<Flight, String> {
+    pub fn new(mission: Arc<Mission>, me: usize, speed_up: Option<f64>) -> Result<Flight, String> {
         let start = mission.vehicles[me].start;
-        Flight::from(mission, me, start, Time::ZERO, watch_deadlines)
+        Flight::from(mission, me, start, Time::ZERO, speed_up)
     }
 
     /// A flight that joins under way at `now`, at the place where the vehicle is.
     ///
     /// # Errors
     /// Why the vehicle cannot be built.
-    pub fn rejoin(mission: Arc<Mission>, me: usize, start: Start, now: Time) -> Result<Flight, String> {
-        let mut flight = Flight::from(mission, me, start, now, true)?;
+    pub fn rejoin(
+        mission: Arc<Mission>,
+        me: usize,
+        start: Start,
+        now: Time,
+        speed_up: Option<f64>,
+    ) -> Result<Flight, String> {
+        let mut flight = Flight::from(mission, me, start, now, speed_up)?;
         flight.rejoining = true;
         Ok(flight)
     }
 
-    fn from(mission: Arc<Mission>, me: usize, start: Start, now: Time, watch: bool) -> Result<Flight, String> {
+    fn from(
+        mission: Arc<Mission>,
+        me: usize,
+        start: Start,
+        now: Time,
+        speed_up: Option<f64>,
+    ) -> Result<Flight, String> {
         let period = mission.control_period.nanos();
         Ok(Flight {
             craft: mission.craft(me, start)?,
@@ -92,9 +109,11 @@ impl Flight {
             speed: mission.speed.clone(),
             next: (now.nanos() + period - 1).div_euclid(period).max(0),
             last: None,
+            next_message: 0,
             over: false,
             rejoining: false,
-            deadlines: watch.then(Deadlines::default),
+            deadlines: speed_up.map(|_| Deadlines::default()),
+            speed_up: speed_up.unwrap_or(1.0),
             outputs: VecDeque::new(),
             mission,
             me,
@@ -182,11 +201,15 @@ impl Flight {
         let heard = present.len() as u16;
         self.craft.command(reference, demand);
 
-        if tick % self.mission.message_ticks == 0 {
+        // The number of a message follows from the time, so that it grows across a restart; a message that fell into
+        // missed control periods is sent late rather than not at all.
+        let number = tick / self.mission.message_ticks;
+        if number >= self.next_message {
+            self.next_message = number + 1;
             let state = CoordinationState {
                 mission: self.mission.digest,
                 sender: self.me as u16,
-                seq: tick as u32,
+                seq: number as u32,
                 made: t,
                 xi: own.xi,
                 eta_over_r: self.mission.law.needs_speed_error().then_some(own.eta / own.r),
@@ -228,12 +251,12 @@ impl Flight {
     }
 
     fn watch_deadline(&mut self, now: Time, due: i64) {
-        let instant = self.instant(due);
+        let late_ns = ((now - self.instant(due)).nanos() as f64 / self.speed_up) as i64;
         let next = self.next;
         let Some(deadlines) = &mut self.deadlines else { return };
         deadlines.met += 1;
         deadlines.missed += (due - next).max(0) as u64;
-        deadlines.worst_late_ns = deadlines.worst_late_ns.max((now - instant).nanos());
+        deadlines.worst_late_ns = deadlines.worst_late_ns.max(late_ns);
         if deadlines.met + deadlines.missed >= TICKS_PER_REPORT {
             self.report_deadlines(now);
         }

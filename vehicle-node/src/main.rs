@@ -6,6 +6,8 @@ use clap::Parser;
 use vehicle_node::program::{Args, run};
 
 fn main() -> ExitCode {
+    let args = Args::parse();
+    bus::setup::share_one_runtime();
     bus::console::init_log();
-    run(Args::parse())
+    run(args)
 }

@@ -196,12 +196,15 @@ impl VehicleNode {
     fn take_off(&mut self, now: Time, last: Option<&StateRow>) {
         let late = self.is_late(now);
         let Some(load) = self.load.as_mut().filter(|_| self.phase == Phase::Armed) else { return };
+        let speed_up = match load.clock {
+            Some(ClockPlan::Real { speed_up, .. }) => Some(speed_up),
+            _ => None,
+        };
         let flight = if late {
             let start = rejoin_at(&load.mission, load.me, &load.speeds, now, last);
-            Flight::rejoin(load.mission.clone(), load.me, start, now)
+            Flight::rejoin(load.mission.clone(), load.me, start, now, speed_up)
         } else {
-            let real = load.clock.is_some_and(|clock| clock != ClockPlan::Stepped);
-            Flight::new(load.mission.clone(), load.me, real)
+            Flight::new(load.mission.clone(), load.me, speed_up)
         };
         match flight {
             Ok(mut flight) => {
