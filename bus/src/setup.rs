@@ -6,7 +6,7 @@
 //! | the hub's sessions are routers, a participant's is a client | a client talks to its router only |
 //! | default-deny access control on every listening session | what is not listed below does not cross |
 //! | lease 2 s on both sides | each side's lease is what the *other* side waits before it believes a silence |
-//! | TCP window and queues left alone, 16 batches for the two planes | a burst must not become a loss |
+//! | 16 batches for each plane's queue | a burst must not become a loss, and the mission plane never blocks |
 //! | at most 64 KiB per message received | the default is 1 GiB |
 //!
 //! Sessions run on Zenoh's own threads, so everything here is called from plain threads and from no async runtime.
