@@ -2,8 +2,8 @@
 
 use std::hint::black_box;
 
+use bus::recording::{CanonicalRecorder, Origin, Recorder, read_from};
 use common::record::{Fate, MessageRow, Record, Row, StateRow};
-use cpf_bus::recording::{CanonicalRecorder, Origin, Recorder, read_from};
 use divan::Bencher;
 use divan::counter::ItemsCount;
 

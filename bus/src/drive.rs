@@ -108,6 +108,29 @@ pub enum Next<P: Port + ?Sized> {
     Exit(P::Exit),
 }
 
+/// How long a program that was started for one flight has had nothing to fly: an orphan must not live for ever.
+#[derive(Clone, Copy, Debug)]
+pub struct Rest(Instant);
+
+impl Default for Rest {
+    fn default() -> Rest {
+        Rest(Instant::now())
+    }
+}
+
+impl Rest {
+    /// Ten minutes.
+    const LIMIT: Duration = Duration::from_secs(600);
+
+    /// Whether the rest has lasted too long; flying begins it anew.
+    pub fn is_over(&mut self, flying: bool) -> bool {
+        if flying {
+            *self = Rest::default();
+        }
+        self.0.elapsed() > Rest::LIMIT
+    }
+}
+
 /// Runs a program until its port ends it.
 pub fn drive<P: Port>(
     machine: &mut P::Machine,

@@ -31,9 +31,9 @@ pub struct Outcome {
 
 /// What happens next, and to whom.
 enum Event {
-    ToHub(HubInput),
-    ToNode(usize, NodeInput),
-    ToConduct(ConductInput),
+    Hub(HubInput),
+    Node(usize, NodeInput),
+    Conduct(ConductInput),
 }
 
 struct Fleet<'m> {
@@ -66,10 +66,10 @@ pub fn simulate(
         outcome: None,
     };
     for (index, vehicle) in mission.vehicles.iter().enumerate() {
-        fleet.events.push_back(Event::ToHub(HubInput::Joined(vehicle.id.clone())));
-        fleet.events.push_back(Event::ToNode(index, NodeInput::Connected));
+        fleet.events.push_back(Event::Hub(HubInput::Joined(vehicle.id.clone())));
+        fleet.events.push_back(Event::Node(index, NodeInput::Connected));
     }
-    fleet.events.push_back(Event::ToConduct(ConductInput::Connected));
+    fleet.events.push_back(Event::Conduct(ConductInput::Connected));
     let mut told = Time::from_nanos(i64::MIN);
     let (mut quiet, mut asked_at) = (0, told);
     loop {
@@ -107,15 +107,15 @@ fn from_control(message: ToFleet) -> HubInput {
 impl Fleet<'_> {
     fn step(&mut self, event: Event, record: &mut impl FnMut(Row)) {
         match event {
-            Event::ToHub(input) => {
+            Event::Hub(input) => {
                 self.hub.handle(self.now, Some(input));
                 self.drain_hub(record);
             }
-            Event::ToNode(index, input) => {
+            Event::Node(index, input) => {
                 self.nodes[index].handle(self.now, Some(input));
                 self.drain_node(index, record);
             }
-            Event::ToConduct(input) => {
+            Event::Conduct(input) => {
                 self.conduct.handle(Time::ZERO, Some(input));
                 self.drain_conduct();
             }
@@ -127,11 +127,11 @@ impl Fleet<'_> {
             match output {
                 HubOutput::ToVehicle(id, message) => {
                     if let Some(index) = self.mission.index_of(&id) {
-                        self.events.push_back(Event::ToNode(index, NodeInput::Message(message)));
+                        self.events.push_back(Event::Node(index, NodeInput::Message(message)));
                     }
                 }
                 HubOutput::ToControl { message, .. } => {
-                    self.events.push_back(Event::ToConduct(ConductInput::FromFleet(message)));
+                    self.events.push_back(Event::Conduct(ConductInput::FromFleet(message)));
                 }
                 HubOutput::Record(row) => record(row),
                 HubOutput::StartClock(_) => {
@@ -155,7 +155,7 @@ impl Fleet<'_> {
             match output {
                 NodeOutput::Send(message) => {
                     let id = self.mission.vehicles[index].id.clone();
-                    self.events.push_back(Event::ToHub(HubInput::FromVehicle(id, message)));
+                    self.events.push_back(Event::Hub(HubInput::FromVehicle(id, message)));
                 }
                 NodeOutput::Record(row) => record(row),
                 NodeOutput::OpenLog { .. } => {
@@ -175,7 +175,7 @@ impl Fleet<'_> {
     fn drain_conduct(&mut self) {
         while let Some(output) = self.conduct.poll_output() {
             match output {
-                ConductOutput::Send(message) => self.events.push_back(Event::ToHub(from_control(message))),
+                ConductOutput::Send(message) => self.events.push_back(Event::Hub(from_control(message))),
                 ConductOutput::Over(phase) => self.outcome = Some(Ok(phase)),
                 ConductOutput::Failed(reason) => self.outcome = Some(Err(reason)),
                 ConductOutput::Progress(..) | ConductOutput::Log { .. } | ConductOutput::Done { .. } => {}

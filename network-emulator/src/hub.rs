@@ -167,7 +167,7 @@ impl Hub {
         self.outputs.push_back(HubOutput::Say(text));
     }
 
-    fn to_vehicle(&mut self, id: &str, message: ToVehicle) {
+    fn tell_vehicle(&mut self, id: &str, message: ToVehicle) {
         self.outputs.push_back(HubOutput::ToVehicle(id.to_string(), message));
     }
 
@@ -189,15 +189,15 @@ impl Hub {
         load.mission.vehicles.iter().map(|v| v.id.clone()).filter(|id| is_up(id)).collect()
     }
 
-    fn to_fleet(&mut self, message: &ToVehicle) {
+    fn tell_fleet(&mut self, message: &ToVehicle) {
         for id in self.connected() {
-            self.to_vehicle(&id, message.clone());
+            self.tell_vehicle(&id, message.clone());
         }
     }
 
     // --- mission-control -------------------------------------------------------------------------------------------
 
-    fn from_control(&mut self, now: Time, message: ToFleet) {
+    fn hear_control(&mut self, now: Time, message: ToFleet) {
         match message {
             ToFleet::Status => self.status(now),
             ToFleet::Upload { mission } => self.upload(now, &mission),
@@ -208,7 +208,7 @@ impl Hub {
                 let ids: Vec<String> =
                     self.vehicles.iter().filter(|(_, k)| k.connected).map(|(id, _)| id.clone()).collect();
                 for id in ids {
-                    self.to_vehicle(&id, ToVehicle::Dismiss);
+                    self.tell_vehicle(&id, ToVehicle::Dismiss);
                 }
                 self.outputs.push_back(HubOutput::Dismissed);
             }
@@ -217,7 +217,7 @@ impl Hub {
             }
             ToFleet::SendLog { who, digest, file, offset } => {
                 if self.vehicles.get(&who).is_some_and(|known| known.connected) {
-                    self.to_vehicle(&who, ToVehicle::SendLog { digest, file, offset });
+                    self.tell_vehicle(&who, ToVehicle::SendLog { digest, file, offset });
                 } else {
                     self.refuse(format!("{who} is not connected, so its log cannot be had now"));
                 }
@@ -310,7 +310,7 @@ impl Hub {
     fn arm(&mut self, id: &str) {
         if let Some(load) = &self.load {
             let mission = load.mission.text.clone();
-            self.to_vehicle(id, ToVehicle::Arm { mission });
+            self.tell_vehicle(id, ToVehicle::Arm { mission });
         }
     }
 
@@ -350,7 +350,7 @@ impl Hub {
         self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
         match &mut load.lockstep {
             Some(lockstep) => lockstep.speeds.push(command),
-            None => self.to_fleet(&ToVehicle::Speed(command)),
+            None => self.tell_fleet(&ToVehicle::Speed(command)),
         }
         self.answer(FromFleet::SpeedTaken { at, speed });
     }
@@ -369,7 +369,7 @@ impl Hub {
             self.note(now, why);
             self.outputs.push_back(HubOutput::CloseLog);
         }
-        self.to_fleet(&ToVehicle::Stop);
+        self.tell_fleet(&ToVehicle::Stop);
         self.say(format!("flight ended: {why}"));
         self.status(now);
     }
@@ -410,7 +410,7 @@ impl Hub {
         }
     }
 
-    fn from_vehicle(&mut self, now: Time, id: &str, message: FromVehicle) {
+    fn hear_vehicle(&mut self, now: Time, id: &str, message: FromVehicle) {
         match message {
             FromVehicle::Hello { phase, flight } => self.hello(id, phase, flight),
             FromVehicle::Armed { digest } => {
@@ -461,7 +461,7 @@ impl Hub {
             (Some(load), Some(flight)) if same(load, &flight) && phase != Phase::Armed => {
                 // It has flown on alone; tell it what it missed.
                 for command in load.speeds.clone() {
-                    self.to_vehicle(id, ToVehicle::Speed(command));
+                    self.tell_vehicle(id, ToVehicle::Speed(command));
                 }
             }
             (Some(load), _) if load.mission.index_of(id).is_some() => self.arm(id),
@@ -506,7 +506,7 @@ impl Hub {
         }
         if let Some(clock) = load.clock {
             let (digest, speeds) = (load.mission.digest, load.speeds.clone());
-            self.to_vehicle(id, ToVehicle::Start { digest, clock, speeds });
+            self.tell_vehicle(id, ToVehicle::Start { digest, clock, speeds });
             if let Some(known) = self.vehicles.get_mut(id) {
                 known.phase = Phase::Running;
             }
@@ -545,7 +545,7 @@ impl Hub {
         for known in self.vehicles.values_mut().filter(|known| known.phase == Phase::Armed) {
             known.phase = Phase::Running;
         }
-        self.to_fleet(&ToVehicle::Start { digest, clock, speeds: Vec::new() });
+        self.tell_fleet(&ToVehicle::Start { digest, clock, speeds: Vec::new() });
         self.drain_emulator();
         self.say(format!("{name} is under way"));
         if !real {
@@ -631,10 +631,10 @@ impl Machine for Hub {
         match input {
             Some(HubInput::Joined(id)) => self.joined(id),
             Some(HubInput::Left(id)) => self.left(now, &id),
-            Some(HubInput::FromVehicle(id, message)) => self.from_vehicle(now, &id, message),
+            Some(HubInput::FromVehicle(id, message)) => self.hear_vehicle(now, &id, message),
             Some(HubInput::FromControl { who, message }) => {
                 self.asker = Some(who);
-                self.from_control(now, message);
+                self.hear_control(now, message);
                 self.asker = None;
             }
             Some(HubInput::LogFailed(reason)) => self.stop(now, &reason),

@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 
 use bus::Plane;
 use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, drive};
+use bus::drive::{Clock, Next, Port, Rest, drive};
 use bus::logs::Logs;
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use clap::Parser;
 use common::wire::fleet::{Pace, ToFleet};
-use common::wire::vehicle::{ClockPlan, FromVehicle};
+use common::wire::vehicle::{ClockPlan, FromVehicle, Phase};
 use common::wire::{self, Garbage, GarbageCount};
 
 use crate::hub::{COLLECTOR, HUB, Hub, HubInput, HubOutput, OPERATOR};
@@ -37,7 +37,7 @@ pub struct Args {
     /// Folder for the emulator's logs
     #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
     pub logs: PathBuf,
-    /// End when mission-control has collected the logs of a flight
+    /// End when mission-control has collected the logs of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
 }
@@ -64,6 +64,7 @@ pub fn run(args: Args) -> ExitCode {
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
+        rest: Rest::default(),
         recording_failed: None,
     };
     let exit = drive(&mut Hub::new(), &mut port, &mut Clock::Stopped, &events);
@@ -81,6 +82,7 @@ struct HubPort {
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
     once: bool,
+    rest: Rest,
     /// Why recording failed; the flight is stopped at the next opportunity.
     recording_failed: Option<String>,
 }
@@ -192,10 +194,14 @@ impl Port for HubPort {
         Next::Go
     }
 
-    fn tend(&mut self, _hub: &Hub) -> Next<Self> {
+    fn tend(&mut self, hub: &Hub) -> Next<Self> {
         if let Some(failure) = self.logs.take_failure() {
             tracing::error!("{failure}; the network goes on without it");
             self.recording_failed = Some(failure);
+        }
+        if self.once && self.rest.is_over(hub.phase() == Phase::Running) {
+            tracing::warn!("nothing to fly for ten minutes; ended");
+            return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {
             tracing::info!("ended by signal");

@@ -6,7 +6,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, drive};
+use bus::drive::{Clock, Next, Port, Rest, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::logs::Logs;
 use bus::setup::Endpoint;
@@ -45,7 +45,7 @@ pub struct Args {
     /// Give up when the network-emulator has not been found for this long [s] [default: never]
     #[arg(long, value_name = "SECONDS")]
     pub patience: Option<f64>,
-    /// End when mission-control has collected the log of a flight
+    /// End when mission-control has collected the log of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
 }
@@ -70,6 +70,7 @@ pub fn run(args: Args) -> ExitCode {
         line,
         stop,
         once: args.once,
+        rest: Rest::default(),
         garbage: GarbageCount::default(),
         refused: None,
         recording_failed: false,
@@ -91,6 +92,7 @@ struct VehiclePort {
     logs: Logs,
     stop: StopFlag,
     once: bool,
+    rest: Rest,
     garbage: GarbageCount,
     refused: Option<Refusal>,
     recording_failed: bool,
@@ -181,6 +183,10 @@ impl Port for VehiclePort {
         if let Some(refusal) = self.refused.take() {
             tracing::error!("{}: {refusal}", self.id);
             return Next::Exit(ExitCode::from(3));
+        }
+        if self.once && self.rest.is_over(node.phase() == Phase::Running) {
+            tracing::warn!("{}: nothing to fly for ten minutes; ended", self.id);
+            return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {
             tracing::info!("{}: ended by signal", self.id);
