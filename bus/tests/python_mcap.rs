@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use common::record::{Fate, MessageRow, Record, Row, StateRow};
-use cpf_bus::recording::{Origin, Recorder};
+use bus::recording::{Origin, Recorder};
 
 const TICKS: i64 = 200;
 
@@ -108,7 +108,7 @@ with open(sys.argv[1], "rb") as file:
         pass
 print(count)
 "#;
-    let ours = cpf_bus::recording::read(&cut).expect("reads");
+    let ours = bus::recording::read(&cut).expect("reads");
     assert!(!ours.complete);
     assert!(ours.exact.len() >= 100 && ours.exact.len() < 600 && ours.exact.len().is_multiple_of(100));
     assert_eq!(python(streamed, &cut), ours.exact.len().to_string());

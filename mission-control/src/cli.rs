@@ -48,7 +48,7 @@ enum What {
     Simulate {
         /// The mission file
         mission: PathBuf,
-        /// The run folder [default: runs/<mission>-<time>]
+        /// The run folder (default: runs/MISSION-TIME)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
         /// JSON for a pipe
@@ -59,7 +59,7 @@ enum What {
     Run(RunArgs),
     /// Set the formation speed of the fleet under way
     Speed {
-        /// The speed v_L [units of xi per s]
+        /// The speed v_L (units of xi per s)
         #[arg(allow_negative_numbers = true)]
         speed: f64,
         #[command(flatten)]
@@ -90,7 +90,7 @@ enum What {
         /// The format
         #[arg(long, value_enum, default_value = "csv")]
         format: Format,
-        /// Where to [default: the run folder]
+        /// Where to (default: the run folder)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -105,7 +105,7 @@ enum What {
     Recover {
         /// The recording that was cut off
         recording: PathBuf,
-        /// The whole one [default: <name>-recovered.mcap beside it]
+        /// The whole one (default: NAME-recovered.mcap beside it)
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
@@ -121,13 +121,13 @@ enum What {
 struct RunArgs {
     /// The mission file
     mission: PathBuf,
-    /// The run folder [default: runs/<mission>-<time>]
+    /// The run folder (default: runs/MISSION-TIME)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Fly with a fleet that is already up, at this endpoint [default: tcp/127.0.0.1:7447]
+    /// Fly with a fleet that is already up, at this endpoint (default: tcp/127.0.0.1:7447)
     #[arg(long, value_name = "tcp/HOST:PORT", num_args = 0..=1, default_missing_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
     attach: Option<Endpoint>,
-    /// Where the own network-emulator listens [default: tcp/127.0.0.1:7447, or a free port if that is taken]
+    /// Where the own network-emulator listens (default: tcp/127.0.0.1:7447, or a free port if that is taken)
     #[arg(long, value_name = "tcp/HOST:PORT", conflicts_with = "attach")]
     listen: Option<Endpoint>,
     /// Mission seconds per second of wall clock
@@ -136,7 +136,7 @@ struct RunArgs {
     /// Advance in lock step, as fast as the processes can; equals `simulate` bit for bit
     #[arg(long)]
     stepped: bool,
-    /// Give up when the fleet is not complete after this long [s] [default: never with --attach, 60 s else]
+    /// Give up when the fleet is not complete after this long (s) (default: never with --attach, 60 s else)
     #[arg(long, value_name = "SECONDS")]
     patience: Option<f64>,
     /// JSON for a pipe

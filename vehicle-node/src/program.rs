@@ -33,7 +33,7 @@ use crate::node::{NodeInput, NodeOutput, VehicleNode};
     mission-control run missions/auv-helix.toml --attach"
 )]
 pub struct Args {
-    /// The vehicle's name in the mission file [default: the host's name]
+    /// The vehicle's name in the mission file (default: the host's name)
     #[arg(long, env = "CPF_ID")]
     pub id: Option<String>,
     /// The network-emulator to connect to
@@ -42,7 +42,7 @@ pub struct Args {
     /// Folder for the logs of this vehicle
     #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
     pub logs: PathBuf,
-    /// Give up when the network-emulator has not been found for this long [s] [default: never]
+    /// Give up when the network-emulator has not been found for this long (s) (default: never)
     #[arg(long, value_name = "SECONDS")]
     pub patience: Option<f64>,
     /// End when mission-control has collected the log of a flight, or when nothing has been flown for ten minutes

@@ -1,6 +1,6 @@
 //! The mission file as written: TOML, units in the names of the keys, unknown keys are faults.
 //!
-//! Nothing here is checked beyond its type; [`super::check`] turns it into a [`super::Mission`].
+//! Nothing here is checked beyond its type; the check turns it into a [`super::Mission`].
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct MissionFile {
     /// Seed of every random stream of the run.
     #[serde(default = "one_u64")]
     pub seed: u64,
-    /// Length of the mission [s].
+    /// Length of the mission (s).
     pub duration_s: f64,
     /// How time is cut into steps.
     #[serde(default)]
@@ -38,11 +38,11 @@ pub struct MissionFile {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct ClockSection {
-    /// The control laws run at this period and hold their output between [s].
+    /// The control laws run at this period and hold their output between (s).
     pub control_period_s: f64,
     /// Runge-Kutta steps per control period.
     pub substeps: u32,
-    /// Period of the recorded states [s]; a multiple of the control period.
+    /// Period of the recorded states (s); a multiple of the control period.
     pub record_period_s: f64,
 }
 
@@ -55,7 +55,7 @@ impl Default for ClockSection {
 /// How fast the formation goes: either `speed` or `profile`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct FormationSection {
-    /// Formation speed v_L for the whole mission [units of xi per s].
+    /// Formation speed v_L for the whole mission (units of xi per s).
     pub speed: Option<f64>,
     /// Formation speed by steps, the first from 0 s.
     pub profile: Option<Vec<SpeedStep>>,
@@ -64,9 +64,9 @@ pub struct FormationSection {
 /// One step of a speed profile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct SpeedStep {
-    /// From when on [s].
+    /// From when on (s).
     pub from_s: f64,
-    /// Formation speed v_L [units of xi per s].
+    /// Formation speed v_L (units of xi per s).
     pub speed: f64,
 }
 
@@ -75,10 +75,10 @@ pub struct SpeedStep {
 pub struct CoordinationSection {
     /// The coordination law and its gains.
     pub law: LawChoice,
-    /// Every vehicle speaks at this period [s]; a multiple of the control period.
+    /// Every vehicle speaks at this period (s); a multiple of the control period.
     #[serde(default = "default_message_period")]
     pub message_period_s: f64,
-    /// A neighbour leaves N_i when nothing has been heard of it for this long [s]; without it, it never leaves.
+    /// A neighbour leaves N_i when nothing has been heard of it for this long (s); without it, it never leaves.
     pub validity_s: Option<f64>,
     /// What stands for a neighbour's state between its messages.
     #[serde(default)]
@@ -122,43 +122,43 @@ pub enum LawChoice {
 /// One gain.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct GainOnly {
-    /// Coordination gain k [1/s].
+    /// Coordination gain k (1/s).
     pub gain: f64,
 }
 
 /// Gains of (3.43).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Solution1 {
-    /// a_i, the same for all [1/s].
+    /// a_i, the same for all (1/s).
     pub a: f64,
 }
 
 /// Gains of (3.44).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Solution2 {
-    /// a_i, the same for all [1/s].
+    /// a_i, the same for all (1/s).
     pub a: f64,
-    /// b_i, the same for all [m²/s²].
+    /// b_i, the same for all (m²/s²).
     pub b: f64,
 }
 
 /// Gains of (3.45).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Solution3 {
-    /// a_i, the same for all [1/s].
+    /// a_i, the same for all (1/s).
     pub a: f64,
-    /// b_i, the same for all [1/s].
+    /// b_i, the same for all (1/s).
     pub b: f64,
-    /// Saturation bound [m/s].
+    /// Saturation bound (m/s).
     pub x_m: f64,
 }
 
 /// Gain and delay of (4.34) and (4.42).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Delayed {
-    /// Coordination gain k, divided by the number of neighbours heard [1/s].
+    /// Coordination gain k, divided by the number of neighbours heard (1/s).
     pub gain: f64,
-    /// The delay τ the vehicles are told, to compute v_L* = v_L / (1 + k τ) [s].
+    /// The delay τ the vehicles are told, to compute v_L* = v_L / (1 + k τ) (s).
     pub delay_s: f64,
 }
 
@@ -168,7 +168,7 @@ pub struct NetworkSection {
     /// Links in both directions: pairs of vehicle ids.
     #[serde(default)]
     pub links: Vec<[String; 2]>,
-    /// Links in one direction: [from, to].
+    /// Links in one direction: (from, to).
     #[serde(default)]
     pub one_way: Vec<[String; 2]>,
     /// Delay of every message.
@@ -217,16 +217,16 @@ pub enum DelayChoice {
 /// The same delay for every message.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ConstantDelay {
-    /// The delay [s].
+    /// The delay (s).
     pub delay_s: f64,
 }
 
 /// A delay drawn for every message.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct JitteredDelay {
-    /// Least delay [s].
+    /// Least delay (s).
     pub min_s: f64,
-    /// Greatest delay [s].
+    /// Greatest delay (s).
     pub max_s: f64,
 }
 
@@ -268,11 +268,11 @@ pub enum SwitchingChoice {
 /// All links together, up for a part of every period.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct PeriodicSwitching {
-    /// Length of the period [s].
+    /// Length of the period (s).
     pub period_s: f64,
-    /// When in the period the links come up [s].
+    /// When in the period the links come up (s).
     pub up_from_s: f64,
-    /// How long they stay up [s].
+    /// How long they stay up (s).
     pub up_for_s: f64,
 }
 
@@ -281,18 +281,18 @@ pub struct PeriodicSwitching {
 pub struct IntervalSwitching {
     /// The intervals.
     pub up: Vec<UpInterval>,
-    /// The intervals repeat with this period [s]; without it they happen once.
+    /// The intervals repeat with this period (s); without it they happen once.
     pub period_s: Option<f64>,
 }
 
 /// An interval during which links are up.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct UpInterval {
-    /// Begin [s].
+    /// Begin (s).
     pub from_s: f64,
-    /// End [s].
+    /// End (s).
     pub to_s: f64,
-    /// Directed links [from, to]; all of them if absent.
+    /// Directed links (from, to); all of them if absent.
     pub links: Option<Vec<[String; 2]>>,
 }
 
@@ -301,16 +301,16 @@ pub struct UpInterval {
 pub struct RandomSwitching {
     /// Asymptotic connectivity-loss rate, 0 to below 1.
     pub alpha: f64,
-    /// Connectivity-loss bound T_0 [s].
+    /// Connectivity-loss bound T_0 (s).
     pub t_0_s: f64,
-    /// Least time between two changes [s].
+    /// Least time between two changes (s).
     pub dwell_s: f64,
 }
 
 /// One link at a time.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct OneAtATime {
-    /// How long each is up [s].
+    /// How long each is up (s).
     pub dwell_s: f64,
 }
 
@@ -344,17 +344,17 @@ pub struct VehicleSection {
 /// Where a vehicle starts.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct StartSection {
-    /// East [m].
+    /// East (m).
     pub x_m: f64,
-    /// North [m].
+    /// North (m).
     pub y_m: f64,
-    /// Up [m].
+    /// Up (m).
     #[serde(default)]
     pub z_m: f64,
-    /// Heading, counter-clockwise from x [deg].
+    /// Heading, counter-clockwise from x (deg).
     #[serde(default)]
     pub yaw_deg: f64,
-    /// Forward speed [m/s].
+    /// Forward speed (m/s).
     #[serde(default)]
     pub speed_mps: f64,
     /// Path parameter of the virtual target; without it, of the path's point closest in the plane.
@@ -377,9 +377,9 @@ pub enum ModelChoice {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct DynamicUnicycle {
-    /// Mass m [kg].
+    /// Mass m (kg).
     pub mass_kg: f64,
-    /// Moment of inertia I about the vertical [kg m²].
+    /// Moment of inertia I about the vertical (kg m²).
     pub inertia_kgm2: f64,
 }
 
@@ -412,7 +412,7 @@ pub enum FollowingChoice {
 /// Gain of (1.4).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct LineOfSight {
-    /// Look-ahead distance Δ [m].
+    /// Look-ahead distance Δ (m).
     pub distance_m: f64,
 }
 
@@ -420,17 +420,17 @@ pub struct LineOfSight {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Proposition31 {
-    /// Heading gain k_1 [1/s].
+    /// Heading gain k_1 (1/s).
     pub k1: f64,
     /// Approach-angle gain k_2, above 0 and at most 1.
     pub k2: f64,
-    /// Along-path gain k_3 of the virtual target [1/s].
+    /// Along-path gain k_3 of the virtual target (1/s).
     pub k3: f64,
-    /// Turn-rate gain k_4 [1/s].
+    /// Turn-rate gain k_4 (1/s).
     pub k4: f64,
-    /// Length ε_0 over which the approach angle builds up [m].
+    /// Length ε_0 over which the approach angle builds up (m).
     pub epsilon_m: f64,
-    /// Gain of the speed loop when the coordination law gives a rate [1/s].
+    /// Gain of the speed loop when the coordination law gives a rate (1/s).
     pub k_speed: f64,
 }
 
@@ -446,15 +446,15 @@ impl Default for Proposition31 {
 pub struct Theorem47 {
     /// How the virtual target moves.
     pub kind: FollowingType,
-    /// Position gain k_e [t/s].
+    /// Position gain k_e (t/s).
     pub k_e: f64,
-    /// Velocity gain k_φ [t⁻¹ s⁻¹ in t, m, s, kN].
+    /// Velocity gain k_φ (t⁻¹ s⁻¹ in t, m, s, kN).
     pub k_phi: f64,
-    /// Turn-rate gain k_z [t m²/s].
+    /// Turn-rate gain k_z (t m²/s).
     pub k_z: f64,
-    /// Gain k_η of type I [1/s].
+    /// Gain k_η of type I (1/s).
     pub k_eta: f64,
-    /// First entry of the design vector δ, below 0 [m/s].
+    /// First entry of the design vector δ, below 0 (m/s).
     pub delta1_mps: f64,
 }
 
@@ -492,9 +492,9 @@ pub enum PathChoice {
 /// A straight line.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct LinePath {
-    /// Where xi = 0 [m].
+    /// Where xi = 0 (m).
     pub start_m: [f64; 2],
-    /// Direction, counter-clockwise from x [deg].
+    /// Direction, counter-clockwise from x (deg).
     #[serde(default)]
     pub heading_deg: f64,
     /// Metres per unit of xi.
@@ -505,11 +505,11 @@ pub struct LinePath {
 /// A circle.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct CirclePath {
-    /// Centre [m].
+    /// Centre (m).
     pub centre_m: [f64; 2],
-    /// Radius [m].
+    /// Radius (m).
     pub radius_m: f64,
-    /// Polar angle at which xi = 0 [deg].
+    /// Polar angle at which xi = 0 (deg).
     #[serde(default)]
     pub start_deg: f64,
     /// Which way round.
@@ -534,14 +534,14 @@ pub enum Direction {
 /// A sinusoid along x.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct SinusoidPath {
-    /// Amplitude [m].
+    /// Amplitude (m).
     pub amplitude_m: f64,
-    /// Wavelength [m].
+    /// Wavelength (m).
     pub wavelength_m: f64,
-    /// Mean of y [m].
+    /// Mean of y (m).
     #[serde(default)]
     pub offset_m: f64,
-    /// Phase at x = 0 [deg].
+    /// Phase at x = 0 (deg).
     #[serde(default)]
     pub phase_deg: f64,
 }
@@ -549,9 +549,9 @@ pub struct SinusoidPath {
 /// Lines and arcs, tangent to one another; the first and the last go on beyond their ends.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ChainPath {
-    /// Where xi = 0 [m].
+    /// Where xi = 0 (m).
     pub start_m: [f64; 2],
-    /// Direction there, counter-clockwise from x [deg].
+    /// Direction there, counter-clockwise from x (deg).
     #[serde(default)]
     pub heading_deg: f64,
     /// The pieces, in order.
@@ -573,14 +573,14 @@ pub enum SegmentChoice {
 /// A turn on the spot.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct CornerSegment {
-    /// Angle turned through, positive to the left [deg].
+    /// Angle turned through, positive to the left (deg).
     pub turn_deg: f64,
 }
 
 /// A straight piece.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct LineSegment {
-    /// Length [m].
+    /// Length (m).
     pub length_m: f64,
     /// Metres per unit of xi.
     #[serde(default = "one")]
@@ -590,9 +590,9 @@ pub struct LineSegment {
 /// A piece of a circle.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct ArcSegment {
-    /// Radius [m].
+    /// Radius (m).
     pub radius_m: f64,
-    /// Angle turned through, positive to the left [deg].
+    /// Angle turned through, positive to the left (deg).
     pub sweep_deg: f64,
     /// Metres per unit of xi; the radius if absent, so that xi is the angle.
     pub rate_m: Option<f64>,
@@ -601,16 +601,16 @@ pub struct ArcSegment {
 /// A helix about a vertical axis.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct HelixPath {
-    /// Radius c_1 [m].
+    /// Radius c_1 (m).
     pub radius_m: f64,
     /// One lap in units of xi, T.
     pub lap: f64,
-    /// Climb c_2 per unit of xi [m].
+    /// Climb c_2 per unit of xi (m).
     pub climb_m: f64,
-    /// Polar angle φ_d at xi = 0 [deg].
+    /// Polar angle φ_d at xi = 0 (deg).
     #[serde(default)]
     pub phase_deg: f64,
-    /// Height z_0 at xi = 0 [m].
+    /// Height z_0 at xi = 0 (m).
     #[serde(default)]
     pub z0_m: f64,
 }

@@ -1,4 +1,4 @@
-//! The mission: the file as written ([`file`]), and the checked form that the machines fly.
+//! The mission: the file as written ([`mod@file`]), and the checked form that the machines fly.
 
 mod build;
 mod check;
