@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use common::record::{Fate, MessageRow, Record, Row, StateRow};
 use bus::recording::{Origin, Recorder};
+use common::record::{Fate, MessageRow, Record, Row, StateRow};
 
 const TICKS: i64 = 200;
 

@@ -53,12 +53,25 @@ struct Fleet<'m> {
 /// Why the fleet could not fly.
 pub fn simulate(
     mission: &Arc<Mission>,
+    record: impl FnMut(Row),
+    progress: impl FnMut(Time) -> bool,
+) -> Result<Outcome, String> {
+    simulate_with(Hub::new(), mission, record, progress)
+}
+
+/// [`simulate`] with this hub.
+///
+/// # Errors
+/// Why the fleet could not fly.
+pub fn simulate_with(
+    hub: Hub,
+    mission: &Arc<Mission>,
     mut record: impl FnMut(Row),
     mut progress: impl FnMut(Time) -> bool,
 ) -> Result<Outcome, String> {
     let mut fleet = Fleet {
         mission,
-        hub: Hub::new(),
+        hub,
         nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::new(&vehicle.id)).collect(),
         conduct: Conduct::new(&mission.text, Pace::Stepped, None, false),
         events: VecDeque::new(),

@@ -318,3 +318,196 @@ impl Machine for Emulator {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A mission of three vehicles on lines whose network is given.
+    fn mission(network: &str) -> Arc<Mission> {
+        let vehicle = |i: usize| {
+            format!(
+                "[[vehicles]]\nid = \"v{i}\"\npath = {{ line = {{ start_m = [0.0, {i}.0] }} }}\nstart = {{ x_m = 0.0, y_m = {i}.0 }}\n"
+            )
+        };
+        let text = format!(
+            "name = \"t\"\nseed = 5\nduration_s = 100.0\n[formation]\nspeed = 0.5\n\
+             [coordination]\nlaw = {{ switching = {{ gain = 0.1 }} }}\n\
+             [network]\nlinks = [[\"v1\", \"v2\"], [\"v2\", \"v3\"]]\n{network}\n\
+             [fleet]\nmodel = \"kinematic_unicycle\"\nfollowing = {{ line_of_sight = {{ distance_m = 1.0 }} }}\n{}{}{}",
+            vehicle(1),
+            vehicle(2),
+            vehicle(3)
+        );
+        Arc::new(Mission::parse("t.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
+    }
+
+    fn state(mission: &Mission, sender: u16, seq: u32) -> Vec<u8> {
+        CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi: 1.0, eta_over_r: None }.encode()
+    }
+
+    fn seconds(t: f64) -> Time {
+        Time::from_secs(t)
+    }
+
+    fn drain(emulator: &mut Emulator) -> Vec<Channel> {
+        std::iter::from_fn(|| emulator.poll_output()).collect()
+    }
+
+    /// Who got something, and when it was due.
+    fn deliveries(outputs: &[Channel]) -> Vec<(usize, Time)> {
+        let delivery = |output: &Channel| match output {
+            Channel::Deliver { to, due, .. } => Some((*to, *due)),
+            Channel::Record(_) => None,
+        };
+        outputs.iter().filter_map(delivery).collect()
+    }
+
+    #[test]
+    fn a_message_reaches_the_neighbours_after_the_delay_and_nobody_else() {
+        let mission = mission("delay = { constant = { delay_s = 2.0 } }");
+        let mut emulator = Emulator::new(mission.clone(), None);
+        emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state(&mission, 0, 0) }));
+        emulator.handle(seconds(2.999), None);
+        assert_eq!(deliveries(&drain(&mut emulator)), vec![], "never early");
+        emulator.handle(seconds(3.0), None);
+        assert_eq!(deliveries(&drain(&mut emulator)), vec![(1, seconds(3.0))]);
+    }
+
+    #[test]
+    fn the_switching_signal_gates_reception_and_not_transmission() {
+        // Up in [7.5, 10) of every 10 s, 5 s of delay: what is said at 3 s is heard at 8 s, what is said at 8 s is not.
+        let mission = mission(
+            "delay = { constant = { delay_s = 5.0 } }\nswitching = { periodic = { period_s = 10.0, up_from_s = 7.5, up_for_s = 2.5 } }",
+        );
+        let mut emulator = Emulator::new(mission.clone(), None);
+        emulator.handle(seconds(3.0), Some(Sent { from: 0, bytes: state(&mission, 0, 0) }));
+        emulator.handle(seconds(8.0), Some(Sent { from: 0, bytes: state(&mission, 0, 1) }));
+        emulator.handle(seconds(20.0), None);
+        assert_eq!(deliveries(&drain(&mut emulator)), vec![(1, seconds(8.0))]);
+        let ledger = emulator.ledgers().next().copied().expect("a link");
+        assert_eq!((ledger.sent, ledger.delivered, ledger.link_down), (2, 1, 1));
+    }
+
+    #[test]
+    fn an_interval_of_up_time_contains_its_begin_and_not_its_end() {
+        let mission = mission("switching = { periodic = { period_s = 10.0, up_from_s = 0.0, up_for_s = 2.0 } }");
+        for (t, heard) in [(0.0, 1), (1.999, 1), (2.0, 0), (9.999, 0), (10.0, 1)] {
+            let mut emulator = Emulator::new(mission.clone(), None);
+            emulator.handle(seconds(t), Some(Sent { from: 0, bytes: state(&mission, 0, 0) }));
+            emulator.handle(seconds(t), None);
+            assert_eq!(deliveries(&drain(&mut emulator)).len(), heard, "at {t} s");
+        }
+    }
+
+    #[test]
+    fn bernoulli_losses_come_at_their_probability() {
+        let mission = mission("loss = { bernoulli = { probability = 0.3 } }");
+        let mut emulator = Emulator::new(mission.clone(), None);
+        let n = 20_000;
+        for seq in 0..n {
+            emulator.handle(seconds(f64::from(seq) * 1e-3), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+            emulator.handle(seconds(f64::from(seq) * 1e-3), None);
+            drain(&mut emulator);
+        }
+        let lost = emulator.ledgers().next().map_or(0, |ledger| ledger.lost) as f64 / f64::from(n);
+        // Five standard deviations of the mean of n draws.
+        assert!((lost - 0.3).abs() < 5.0 * (0.3f64 * 0.7 / f64::from(n)).sqrt(), "{lost}");
+    }
+
+    #[test]
+    fn what_is_decided_about_a_message_does_not_depend_on_the_others() {
+        let mission = mission(
+            "loss = { bernoulli = { probability = 0.5 } }\ndelay = { jittered = { min_s = 0.1, max_s = 3.0 } }",
+        );
+        let fates = |order: &[(usize, u32)]| {
+            let mut emulator = Emulator::new(mission.clone(), None);
+            for (from, seq) in order {
+                emulator.handle(seconds(1.0), Some(Sent { from: *from, bytes: state(&mission, *from as u16, *seq) }));
+            }
+            emulator.handle(seconds(50.0), None);
+            let mut deliveries = deliveries(&drain(&mut emulator));
+            deliveries.sort();
+            deliveries
+        };
+        let alternating: Vec<(usize, u32)> = (0..40).flat_map(|seq| [(0, seq), (1, seq), (2, seq)]).collect();
+        let one_by_one: Vec<(usize, u32)> = (0..3).rev().flat_map(|from| (0..40).map(move |seq| (from, seq))).collect();
+        assert_eq!(fates(&alternating), fates(&one_by_one));
+    }
+
+    #[test]
+    fn garbage_is_counted_and_changes_no_ledger() {
+        let mission = mission("");
+        let mut emulator = Emulator::new(mission.clone(), None);
+        let good = state(&mission, 0, 7);
+        let mut other = CoordinationState::decode(&good).expect("sound");
+        other.mission ^= 1;
+        for (from, bytes, kind) in [
+            (0, b"nonsense".to_vec(), Garbage::Foreign),
+            (0, good[..20].to_vec(), Garbage::Malformed),
+            (0, vec![b'C'; 5000], Garbage::Oversized),
+            (0, other.encode(), Garbage::WrongMission),
+            (1, good.clone(), Garbage::Forged),
+        ] {
+            emulator.handle(seconds(1.0), Some(Sent { from, bytes }));
+            assert_eq!(emulator.garbage()[from].of(kind), 1, "{kind:?}");
+        }
+        assert!(emulator.ledgers().all(|ledger| ledger.sent == 0));
+        emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: good.clone() }));
+        emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: good }));
+        assert_eq!(emulator.garbage()[0].of(Garbage::Stale), 1, "said twice");
+        assert_eq!(emulator.totals()[0], 1);
+    }
+
+    #[test]
+    fn a_full_queue_drops_new_messages_with_a_count() {
+        let mission = mission("queue = 3\ndelay = { constant = { delay_s = 50.0 } }");
+        let mut emulator = Emulator::new(mission.clone(), None);
+        for seq in 0..10 {
+            emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+        }
+        let ledger = emulator.ledgers().next().copied().expect("a link");
+        assert_eq!((ledger.sent, ledger.queue_full, ledger.in_flight), (10, 7, 3));
+    }
+
+    proptest! {
+        /// Whatever happens, every ledger balances, nothing is early, and nothing overtakes its instant.
+        #[test]
+        fn ledgers_balance_at_every_instant(
+            steps in proptest::collection::vec((0usize..4, 0u32..500), 1..200),
+            loss in 0.0f64..1.0,
+            most in 0.0f64..5.0,
+        ) {
+            let mission = mission(&format!(
+                "queue = 20\nloss = {{ bernoulli = {{ probability = {loss} }} }}\n\
+                 delay = {{ jittered = {{ min_s = 0.0, max_s = {most} }} }}\n\
+                 switching = {{ random = {{ alpha = 0.5, t_0_s = 2.0, dwell_s = 0.5 }} }}"
+            ));
+            let mut emulator = Emulator::new(mission.clone(), None);
+            let mut now = Time::ZERO;
+            let mut seq = [0; 3];
+            for (who, wait_ms) in steps {
+                now += Span::from_nanos(i64::from(wait_ms) * 1_000_000);
+                if who < 3 {
+                    emulator.handle(now, Some(Sent { from: who, bytes: state(&mission, who as u16, seq[who]) }));
+                    seq[who] += 1;
+                } else {
+                    emulator.handle(now, None);
+                }
+                let outputs = drain(&mut emulator);
+                prop_assert!(deliveries(&outputs).iter().all(|(_, due)| *due <= now));
+                prop_assert!(deliveries(&outputs).is_sorted_by_key(|(_, due)| *due));
+                prop_assert!(emulator.ledgers().all(Ledger::balances));
+            }
+            emulator.finish(now);
+            let in_flight: u64 = emulator.ledgers().map(|ledger| ledger.in_flight).sum();
+            let told = drain(&mut emulator)
+                .iter()
+                .filter(|o| matches!(o, Channel::Record(Row::Exact(Record::Message(row))) if row.fate == Fate::InFlight))
+                .count() as u64;
+            prop_assert_eq!(in_flight, told);
+        }
+    }
+}

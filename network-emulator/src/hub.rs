@@ -15,7 +15,7 @@ use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
 
 use crate::emulator::{Channel, Emulator, Sent};
-use crate::lockstep::Lockstep;
+use crate::lockstep::{Lockstep, WINDOW};
 
 /// Name under which mission-control joins when it conducts a flight and collects its logs.
 pub const COLLECTOR: &str = "mission-control";
@@ -113,6 +113,8 @@ pub struct Hub {
     load: Option<Load>,
     /// Who asked for what is being answered.
     asker: Option<String>,
+    /// Most control periods in one grant of the stepped clock.
+    window: i64,
     outputs: VecDeque<HubOutput>,
 }
 
@@ -145,7 +147,12 @@ impl Default for Hub {
 impl Hub {
     /// A hub that knows nothing yet.
     pub fn new() -> Hub {
-        Hub { vehicles: BTreeMap::new(), load: None, asker: None, outputs: VecDeque::new() }
+        Hub::with_window(WINDOW)
+    }
+
+    /// A hub whose stepped clock grants at most this many control periods at once. What is flown does not depend on it.
+    pub fn with_window(window: i64) -> Hub {
+        Hub { vehicles: BTreeMap::new(), load: None, asker: None, window, outputs: VecDeque::new() }
     }
 
     /// Where the fleet is in its life.
@@ -526,7 +533,7 @@ impl Hub {
         load.phase = Phase::Running;
         load.clock = Some(clock);
         load.emulator = Emulator::new(load.mission.clone(), speed_up);
-        load.lockstep = (!real).then(|| Lockstep::new(&load.mission));
+        load.lockstep = (!real).then(|| Lockstep::new(&load.mission, self.window));
         let (mission, fresh) = (Opened(load.mission.clone()), !load.adopted);
         self.outputs.push_back(HubOutput::OpenLog { mission, fresh });
         if load.adopted {

@@ -341,3 +341,164 @@ impl Machine for Flight {
         (!self.over).then(|| self.instant(self.next))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HELIX: &str = include_str!("../../missions/auv-helix.toml");
+
+    fn mission() -> Arc<Mission> {
+        Arc::new(Mission::parse("m.toml", HELIX).unwrap_or_else(|faults| panic!("{faults}")))
+    }
+
+    fn outputs(flight: &mut Flight) -> Vec<FlightOutput> {
+        std::iter::from_fn(|| flight.poll_output()).collect()
+    }
+
+    fn transmitted(outputs: &[FlightOutput]) -> Vec<CoordinationState> {
+        let state = |output: &FlightOutput| match output {
+            FlightOutput::Transmit(bytes) => CoordinationState::decode(bytes).ok(),
+            _ => None,
+        };
+        outputs.iter().filter_map(state).collect()
+    }
+
+    #[test]
+    fn nothing_but_the_coordination_state_leaves_the_vehicle() {
+        let mut flight = Flight::new(mission(), 0, None).expect("flies");
+        flight.handle(Time::ZERO, None);
+        let outputs = outputs(&mut flight);
+        let [said] = transmitted(&outputs)[..] else { panic!("one message at the start, not {outputs:?}") };
+        assert_eq!((said.sender, said.seq, said.made, said.eta_over_r), (0, 0, Time::ZERO, None));
+        assert!((said.xi - 79.517).abs() < 1e-3);
+    }
+
+    #[test]
+    fn it_speaks_at_the_message_period_and_numbers_follow_from_the_time() {
+        let mut flight = Flight::new(mission(), 0, None).expect("flies");
+        let mut said = Vec::new();
+        flight.run_until(Time::from_secs(1.0), [], |_, output| said.extend(transmitted(&[output])));
+        let numbers: Vec<u32> = said.iter().map(|state| state.seq).collect();
+        assert_eq!(numbers, (0..=10).collect::<Vec<_>>());
+        assert!(said.iter().all(|state| state.made == Time::from_secs(0.1 * f64::from(state.seq))));
+    }
+
+    #[test]
+    fn missed_periods_are_skipped_and_counted_and_the_message_is_sent_late() {
+        let mut flight = Flight::new(mission(), 0, Some(1.0)).expect("flies");
+        flight.handle(Time::ZERO, None);
+        outputs(&mut flight);
+        // Frozen until 0.532 s: the period of 0.5 s runs, those of 0.05 to 0.45 s are missed.
+        flight.handle(Time::from_secs(0.532), None);
+        assert_eq!(transmitted(&outputs(&mut flight)).len(), 1);
+        assert_eq!(flight.poll_timeout(), Some(Time::from_secs(0.55)));
+        let deadlines = flight.deadlines.as_ref().expect("watched");
+        assert_eq!((deadlines.met, deadlines.missed, deadlines.worst_late_ns), (2, 9, 32_000_000));
+    }
+
+    #[test]
+    fn the_body_moves_on_through_missed_periods() {
+        let mut whole = Flight::new(mission(), 0, None).expect("flies");
+        let mut frozen = Flight::new(mission(), 0, None).expect("flies");
+        whole.run_until(Time::from_secs(0.05), [], |_, _| {});
+        frozen.run_until(Time::from_secs(0.05), [], |_, _| {});
+        frozen.handle(Time::from_secs(0.25), None);
+        // The output of the law is held for four periods, so the target has moved on at the same rate.
+        let rate = whole.craft.observe().xi_rate;
+        let moved = frozen.craft.observe().xi - whole.craft.observe().xi;
+        assert!((moved - 4.0 * 0.05 * rate).abs() < 1e-9, "{moved}");
+    }
+
+    #[test]
+    fn a_message_at_the_instant_of_a_period_is_heard_by_the_next_one() {
+        let mission = mission();
+        let state = CoordinationState {
+            mission: mission.digest,
+            sender: 1,
+            seq: 0,
+            made: Time::ZERO,
+            xi: 0.0,
+            eta_over_r: None,
+        };
+        let heard_at = |at: f64| {
+            let mut flight = Flight::new(mission.clone(), 0, None).expect("flies");
+            let inputs = [(Time::from_secs(at), FlightInput::Heard(state.encode()))];
+            let mut rows = Vec::new();
+            flight.run_until(Time::from_secs(0.5), inputs, |_, output| rows.push(output));
+            let counts: Vec<u16> = rows
+                .iter()
+                .filter_map(|output| match output {
+                    FlightOutput::Record(Row::Exact(Record::State(row))) => Some(row.neighbours),
+                    _ => None,
+                })
+                .collect();
+            counts
+        };
+        // States are recorded at 0 s and 0.5 s.
+        assert_eq!(heard_at(0.5), vec![0, 0], "at the very instant");
+        assert_eq!(heard_at(0.499), vec![0, 1], "just before");
+    }
+
+    #[test]
+    fn a_vehicle_that_comes_back_takes_its_target_from_the_first_neighbour_it_hears() {
+        let mission = mission();
+        let now = Time::from_secs(100.0);
+        let start = Start { xi: 5.0, ..mission.vehicles[0].start };
+        let mut flight = Flight::rejoin(mission.clone(), 0, start, now, Some(1.0)).expect("flies");
+        assert_eq!(flight.poll_timeout(), Some(now));
+        let state = CoordinationState {
+            mission: mission.digest,
+            sender: 1,
+            seq: 950,
+            made: Time::from_secs(95.0),
+            xi: 110.0,
+            eta_over_r: None,
+        };
+        flight.handle(now, Some(FlightInput::Heard(state.encode())));
+        flight.handle(now, None);
+        // 5 s old, at v_L* = 1/3.
+        assert!((flight.craft.observe().xi - (110.0 + 5.0 / 3.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_flight_ends_at_its_end_and_says_so_once() {
+        let mission = Arc::new(
+            Mission::parse("m.toml", &HELIX.replace("duration_s = 800.0", "duration_s = 1.0")).expect("sound"),
+        );
+        let mut flight = Flight::new(mission, 0, None).expect("flies");
+        let mut ends = 0;
+        flight.run_until(Time::from_secs(5.0), [], |at, output| {
+            if output == FlightOutput::Finished {
+                assert_eq!(at, Time::from_secs(1.0));
+                ends += 1;
+            }
+        });
+        assert_eq!((ends, flight.poll_timeout()), (1, None));
+    }
+
+    #[test]
+    fn garbage_from_the_air_never_stops_a_flight() {
+        use proptest::prelude::*;
+        let mission = mission();
+        let mut flight = Flight::new(mission.clone(), 0, None).expect("flies");
+        let bytes = proptest::collection::vec(any::<u8>(), 0..120);
+        let mut runner = proptest::test_runner::TestRunner::deterministic();
+        let mut at = Time::ZERO;
+        runner
+            .run(&(bytes, any::<bool>()), |(mut bytes, framed)| {
+                if framed {
+                    bytes.splice(0..0, *b"CX\x01\x00");
+                }
+                let mut flight = Flight::new(mission.clone(), 0, None).expect("flies");
+                flight.handle(Time::ZERO, Some(FlightInput::Heard(bytes)));
+                flight.handle(Time::ZERO, None);
+                prop_assert!(flight.poll_timeout().is_some());
+                Ok(())
+            })
+            .expect("no garbage stops it");
+        at += mission.control_period;
+        flight.handle(at, None);
+        assert_eq!(flight.neighbours.garbage.total(), 0);
+    }
+}

@@ -121,3 +121,75 @@ impl Neighbours {
         (count > 0).then(|| sum / f64::from(count))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HELIX: &str = include_str!("../../missions/auv-helix.toml");
+
+    fn mission(between: &str) -> Mission {
+        let text = HELIX.replace("between = \"align\"", &format!("between = \"{between}\""));
+        Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    fn said(mission: &Mission, sender: u16, made_s: f64, xi: f64) -> Vec<u8> {
+        let made = Time::from_secs(made_s);
+        let seq = (made_s * 10.0) as u32;
+        CoordinationState { mission: mission.digest, sender, seq, made, xi, eta_over_r: None }.encode()
+    }
+
+    /// What stands at 21.05 s for a neighbour that said 10 at 16 s, heard at 21 s.
+    fn stands_for(between: &str) -> f64 {
+        let mission = mission(between);
+        let mut neighbours = Neighbours::new(&mission, 1);
+        neighbours.hear(Time::from_secs(21.0), &said(&mission, 0, 16.0, 10.0)).expect("sound");
+        neighbours.present(Time::from_secs(21.05), 0.5)[0].xi
+    }
+
+    #[test]
+    fn hold_advance_and_align_are_what_they_say() {
+        assert_eq!(stands_for("hold"), 10.0);
+        // 5.05 s at v_L = 0.5.
+        assert!((stands_for("advance") - 12.525).abs() < 1e-12);
+        // To t − τ = 16.05 s, 0.05 s at v_L* = 1/3.
+        assert!((stands_for("align") - (10.0 + 0.05 / 3.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_neighbour_leaves_when_nothing_was_heard_of_it_for_the_validity() {
+        let mission = mission("hold");
+        let mut neighbours = Neighbours::new(&mission, 1);
+        neighbours.hear(Time::from_secs(21.0), &said(&mission, 0, 16.0, 10.0)).expect("sound");
+        assert_eq!(neighbours.present(Time::from_secs(21.3), 0.5).len(), 1);
+        assert_eq!(neighbours.present(Time::from_secs(21.301), 0.5).len(), 0);
+    }
+
+    #[test]
+    fn the_newest_counts_whatever_the_order_of_arrival() {
+        let mission = mission("hold");
+        let mut neighbours = Neighbours::new(&mission, 1);
+        let now = Time::from_secs(30.0);
+        neighbours.hear(now, &said(&mission, 0, 20.0, 2.0)).expect("sound");
+        assert_eq!(neighbours.hear(now, &said(&mission, 0, 19.0, 1.0)), Err(Garbage::Stale), "overtaken");
+        assert_eq!(neighbours.hear(now, &said(&mission, 0, 20.0, 2.0)), Err(Garbage::Stale), "said twice");
+        assert_eq!(neighbours.present(now, 0.5)[0].xi, 2.0);
+        assert_eq!(neighbours.garbage.of(Garbage::Stale), 2);
+    }
+
+    #[test]
+    fn only_neighbours_of_this_mission_and_of_the_past_are_heard() {
+        let mission = mission("hold");
+        let mut neighbours = Neighbours::new(&mission, 0);
+        let now = Time::from_secs(10.0);
+        // Vehicle 0 hears vehicle 1 only.
+        assert_eq!(neighbours.hear(now, &said(&mission, 2, 9.0, 0.0)), Err(Garbage::Forged));
+        assert_eq!(neighbours.hear(now, &said(&mission, 0, 9.0, 0.0)), Err(Garbage::Forged), "its own voice");
+        assert_eq!(neighbours.hear(now, &said(&mission, 77, 9.0, 0.0)), Err(Garbage::Forged));
+        assert_eq!(neighbours.hear(now, &said(&mission, 1, 12.0, 0.0)), Err(Garbage::FromTheFuture));
+        let other = Mission { digest: mission.digest ^ 1, ..mission.clone() };
+        assert_eq!(neighbours.hear(now, &said(&other, 1, 9.0, 0.0)), Err(Garbage::WrongMission));
+        assert!(neighbours.present(now, 0.5).is_empty());
+        assert_eq!(neighbours.formation_xi(now, 0.5), None);
+    }
+}

@@ -584,3 +584,138 @@ fn following_name(following: &FollowingChoice) -> &'static str {
         FollowingChoice::Theorem47(_) => "theorem47",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Mission;
+
+    const HELIX: &str = include_str!("../../../missions/auv-helix.toml");
+    const FIG_3_7: &str = include_str!("../../../missions/thesis/fig-3-7.toml");
+
+    /// What the check says of a mission file, one fault a line.
+    fn faults(text: &str) -> Vec<String> {
+        Mission::parse("m.toml", text)
+            .err()
+            .map_or(Vec::new(), |faults| faults.to_string().lines().map(str::to_string).collect())
+    }
+
+    /// What it says of the flagship with one thing replaced.
+    fn faults_with(old: &str, new: &str) -> Vec<String> {
+        assert!(HELIX.contains(old), "{old:?} is not in the mission");
+        faults(&HELIX.replacen(old, new, 1))
+    }
+
+    #[test]
+    fn every_mission_of_the_project_can_be_flown() {
+        for (name, text) in [
+            ("auv-helix", HELIX),
+            ("fig-1-9", include_str!("../../../missions/thesis/fig-1-9.toml")),
+            ("fig-1-10", include_str!("../../../missions/thesis/fig-1-10.toml")),
+            ("fig-3-7", FIG_3_7),
+            ("fig-3-9", include_str!("../../../missions/thesis/fig-3-9.toml")),
+            ("fig-4-2", include_str!("../../../missions/thesis/fig-4-2.toml")),
+        ] {
+            let mission = Mission::parse(name, text).unwrap_or_else(|faults| panic!("{faults}"));
+            assert_eq!(mission.name, name);
+        }
+    }
+
+    #[test]
+    fn the_initial_target_is_the_closest_point_in_the_plane() {
+        // Erratum 4.23.
+        let mission = Mission::parse("m.toml", HELIX).expect("sound");
+        for (vehicle, gamma) in mission.vehicles.iter().zip([79.517, 70.483, 65.596]) {
+            assert!((vehicle.start.xi - gamma).abs() < 1e-3, "{} starts at {}", vehicle.id, vehicle.start.xi);
+        }
+    }
+
+    #[test]
+    fn the_digest_is_of_the_text() {
+        let parse = |text: &str| Mission::parse("m.toml", text).expect("sound").digest;
+        assert_eq!(parse(HELIX), parse(HELIX));
+        assert_ne!(parse(HELIX), parse(&HELIX.replace("seed = 1", "seed = 2")));
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line_and_what_is_allowed() {
+        let found = faults_with("z0_m = -5.0", "z0 = -5.0");
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].starts_with("m.toml:38: vehicles[1].path.helix.z0: found an unknown key; allowed: "),
+            "{}",
+            found[0]
+        );
+        assert!(found[0].contains("z0_m"));
+    }
+
+    #[test]
+    fn each_fault_names_its_key() {
+        for (old, new, key) in [
+            ("duration_s = 800.0", "duration_s = -1", "duration_s"),
+            ("duration_s = 800.0", "duration_s = \"long\"", "duration_s"),
+            ("control_period_s = 0.05", "control_period_s = 0.0", "clock.control_period_s"),
+            ("message_period_s = 0.1", "message_period_s = 0.07", "coordination.message_period_s"),
+            ("validity_s = 0.3", "validity_s = 0.01", "coordination.validity_s"),
+            ("gain = 0.1", "gain = -0.1", "coordination.law.delayed_with_losses"),
+            ("between = \"align\"", "between = \"guess\"", "coordination.between"),
+            ("up_for_s = 2.5", "up_for_s = 20.0", "network.switching.periodic.up_for_s"),
+            (
+                "delay = { constant = { delay_s = 5.0 } }",
+                "loss = { bernoulli = { probability = 1.5 } }",
+                "network.loss.bernoulli.probability",
+            ),
+            ("id = \"auv2\"", "id = \"auv1\"", "vehicles[1].id"),
+            ("id = \"auv2\"", "id = \"AUV 2\"", "vehicles[1].id"),
+            ("[\"auv2\", \"auv3\"]", "[\"auv2\", \"auv9\"]", "network.links[1]"),
+            (", [\"auv2\", \"auv3\"]", "", "network.links"),
+            ("kind = \"II\"", "delta1_mps = 0.3", "vehicles[0]"),
+            ("{ underactuated_auv = \"sirene\" }", "\"kinematic_unicycle\"", "vehicles[0]"),
+            ("delayed_with_losses = { gain = 0.1, delay_s = 5.0 }", "solution1 = { a = 1.0 }", "coordination.law"),
+            ("speed = 0.5", "", "formation"),
+            ("start = { x_m = 5.0, y_m = -10.0, z_m = -5.0 }", "", "vehicles[0]"),
+        ] {
+            let found = faults_with(old, new);
+            assert!(found.iter().any(|line| line.contains(&format!(": {key}"))), "{new:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_corner_is_refused_for_a_law_that_needs_a_smooth_path() {
+        let text = FIG_3_7.replacen("{ line = { length_m = 3.0 } },", "{ corner = { turn_deg = 30.0 } },", 1);
+        let found = faults(&text);
+        assert!(
+            found.iter().any(|line| line.contains("whose direction jumps") && line.contains("proposition31")),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_law_that_does_not_fit_names_both_sides() {
+        let found = faults_with("{ theorem47 = { kind = \"II\" } }", "{ proposition31 = {} }");
+        assert!(found.iter().any(|l| l.contains("proposition31 with underactuated_auv")), "{found:?}");
+    }
+
+    #[test]
+    fn several_faults_are_reported_together_in_the_order_of_the_file() {
+        let text = HELIX
+            .replace("duration_s = 800.0", "duration_s = 0")
+            .replace("up_for_s = 2.5", "up_for_s = -1")
+            .replace("id = \"auv3\"", "id = \"auv1\"")
+            .replace(
+                "climb_m = 0.05, phase_deg = -135.0, z0_m = 0.0",
+                "climb = 0.05, phase_deg = -135.0, z0_m = 0.0, climb_m = 0.05",
+            );
+        let found = faults(&text);
+        for key in ["duration_s", "up_for_s", "vehicles[2].id", "vehicles[2].path.helix.climb"] {
+            assert!(found.iter().any(|line| line.contains(key)), "{key}: {found:?}");
+        }
+        let lines: Vec<usize> = found.iter().filter_map(|l| l.split(':').nth(1)?.parse().ok()).collect();
+        assert!(lines.is_sorted(), "{found:?}");
+    }
+
+    #[test]
+    fn what_is_no_toml_is_refused_with_its_line() {
+        let found = faults("name = \"x\"\nseed = = 3\n");
+        assert!(found[0].starts_with("m.toml:2:"), "{found:?}");
+    }
+}

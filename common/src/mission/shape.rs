@@ -138,3 +138,18 @@ fn listed<S: AsRef<str>>(names: impl Iterator<Item = S>) -> String {
 fn join(key: &str, name: &str) -> String {
     if key.is_empty() { name.to_string() } else { format!("{key}.{name}") }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::schema;
+
+    #[test]
+    fn the_published_schema_is_the_present_one() {
+        let published: serde_json::Value =
+            serde_json::from_str(include_str!("../../../missions/mission.schema.json")).expect("JSON");
+        assert!(
+            published == schema(),
+            "missions/mission.schema.json is out of date; write it again with: mission-control schema"
+        );
+    }
+}
