@@ -370,6 +370,29 @@ pub fn state_at<'r>(exact: &'r [Record], id: &str, t_s: f64) -> &'r StateRow {
     rows.get(after.wrapping_sub(1)).unwrap_or_else(|| panic!("no state of {id} before {t_s} s"))
 }
 
+/// The coordination state of a vehicle at an instant, on the straight line between the rows around it: in real time a
+/// busy machine may cost a row.
+///
+/// # Panics
+/// If there are no rows on both sides of it.
+pub fn xi_at(exact: &[Record], id: &str, t_s: f64) -> f64 {
+    let rows: Vec<(f64, f64)> = states(exact, id).iter().map(|row| (row.t_ns as f64 / 1e9, row.xi)).collect();
+    let after = rows.partition_point(|(t, _)| *t < t_s);
+    let &(t_1, xi_1) = rows.get(after).unwrap_or_else(|| panic!("no state of {id} at {t_s} s or later"));
+    let (t_0, xi_0) = if after > 0 { rows[after - 1] } else { (t_1, xi_1) };
+    if t_1 > t_0 { xi_0 + (xi_1 - xi_0) * (t_s - t_0) / (t_1 - t_0) } else { xi_1 }
+}
+
+/// ξ of one vehicle minus ξ of another at the last instant that both recordings reach.
+///
+/// # Panics
+/// If one of them recorded nothing.
+pub fn apart_at_last(exact: &[Record], one: &str, other: &str) -> f64 {
+    let last = |id| states(exact, id).last().unwrap_or_else(|| panic!("no state of {id}")).t_ns;
+    let t_s = last(one).min(last(other)) as f64 / 1e9;
+    xi_at(exact, one, t_s) - xi_at(exact, other, t_s)
+}
+
 /// Asserts that two files hold the same bytes, without printing them.
 ///
 /// # Panics
