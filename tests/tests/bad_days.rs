@@ -13,13 +13,14 @@ const MISSION: &str = "tests/missions/parallel-three.toml";
 
 /// A fleet started by hand, under way.
 struct Fleet {
-    ground: Ground,
     endpoint: String,
     emulator: Process,
     vehicles: Vec<Process>,
     control: Process,
     /// Where its logs are, below the ground.
     logs: String,
+    /// Last, so that the folder outlives the processes.
+    ground: Ground,
 }
 
 impl Fleet {
@@ -32,7 +33,7 @@ impl Fleet {
         let vehicles = IDS.iter().map(|id| ground.vehicle(id, &endpoint)).collect();
         let control = conduct(&ground, &endpoint, "run");
         let logs = format!("logs/{:016x}", digest(&text));
-        let fleet = Fleet { ground, endpoint, emulator, vehicles, control, logs };
+        let fleet = Fleet { endpoint, emulator, vehicles, control, logs, ground };
         fleet.status_until("the fleet is under way", |status| status["phase"] == "running" && now(status) > 15.0);
         fleet
     }
