@@ -70,6 +70,9 @@ struct Wire {
     /// Two numbers per message: lane 0 decides the loss, lane 1 the delay.
     stream: Stream,
     ledger: Ledger,
+    /// When each message that takes a place in the queue leaves it. Kept apart from the ledger: a stepped run settles
+    /// arrivals ahead of what is sent before them, and must find the same queue as a run in real time.
+    places: BinaryHeap<Reverse<Time>>,
     /// Sequence number of the newest message taken, to tell a repetition.
     newest: Option<u32>,
 }
@@ -112,6 +115,7 @@ impl Emulator {
                 loss: link.loss,
                 stream: Stream::new(mission.seed, &format!("link/{}->{}", id(link.from), id(link.to))),
                 ledger: Ledger::default(),
+                places: BinaryHeap::new(),
                 newest: None,
             });
         }
@@ -190,14 +194,19 @@ impl Emulator {
             let number = link.ledger.sent;
             link.ledger.take();
             let due = now + Self::delay(link, state.seq);
+            // What is due at this very instant is still there: the network takes what was sent before it delivers.
+            while link.places.peek().is_some_and(|Reverse(due)| *due < now) {
+                link.places.pop();
+            }
             let order = self.counter;
             self.counter += 1;
             let message = UnderWay { due, order, link: index, number, sent: now, bytes: bytes.clone() };
             if link.stream.unit_at(u64::from(state.seq), 0) < link.loss {
                 self.settle(now, &message, Fate::Lost);
-            } else if link.ledger.in_flight > self.mission.queue as u64 {
+            } else if link.places.len() >= self.mission.queue {
                 self.settle(now, &message, Fate::QueueFull);
             } else {
+                link.places.push(Reverse(due));
                 self.under_way.push(Reverse(message));
             }
         }

@@ -119,6 +119,15 @@ impl VehicleNode {
         self.outputs.push_back(NodeOutput::Say(text));
     }
 
+    /// Says what this vehicle is doing: a hub that was restarted learns from it what it has forgotten.
+    fn hello(&mut self) {
+        let flight = self.load.as_ref().and_then(|load| {
+            let clock = load.clock?;
+            Some(FlightPlan { mission: load.mission.text.clone(), clock, speeds: load.speeds.clone() })
+        });
+        self.send(FromVehicle::Hello { phase: self.phase, flight });
+    }
+
     fn message(&mut self, message: ToVehicle) {
         match message {
             ToVehicle::Arm { mission } => self.arm(&mission),
@@ -135,6 +144,10 @@ impl VehicleNode {
 
     fn arm(&mut self, text: &str) {
         let digest = common::mission::digest(text);
+        if self.phase == Phase::Running && self.load.as_ref().is_some_and(|load| load.mission.digest == digest) {
+            // A hub that has just come back did not know; this is no refusal.
+            return self.hello();
+        }
         if self.phase == Phase::Running {
             let flying = self.load.as_ref().map_or("another mission", |load| load.mission.name.as_str());
             let reason = format!("{} is flying {flying}", self.id);
@@ -323,13 +336,7 @@ impl Machine for VehicleNode {
 
     fn handle(&mut self, now: Time, input: Option<NodeInput>) {
         match input {
-            Some(NodeInput::Connected) => {
-                let plan = self.load.as_ref().and_then(|load| {
-                    let clock = load.clock?;
-                    Some(FlightPlan { mission: load.mission.text.clone(), clock, speeds: load.speeds.clone() })
-                });
-                self.send(FromVehicle::Hello { phase: self.phase, flight: plan });
-            }
+            Some(NodeInput::Connected) => self.hello(),
             Some(NodeInput::Lost) => {
                 let stepped =
                     self.load.as_ref().is_some_and(|load| load.clock.is_some_and(|clock| clock == ClockPlan::Stepped));

@@ -1,0 +1,216 @@
+//! Processes that die, freeze and come back while the fleet is under way, and commands given meanwhile. Mission time
+//! passes ten times as fast as the wall's; flights whose length matters to nobody are ended by `stop`.
+
+use std::fs;
+
+use common::mission::digest;
+use common::record::StateRow;
+use cpf_tests::{Ground, PATIENCE, Process, lasting_endpoint, mission_text, of_vehicle, state_at, states, until, with};
+use serde_json::Value;
+
+const IDS: [&str; 3] = ["a", "b", "c"];
+const MISSION: &str = "tests/missions/parallel-three.toml";
+
+/// A fleet started by hand, under way.
+struct Fleet {
+    endpoint: String,
+    emulator: Process,
+    vehicles: Vec<Process>,
+    control: Process,
+    /// Where its logs are, below the ground.
+    logs: String,
+    /// Last, so that the folder outlives the processes.
+    ground: Ground,
+}
+
+impl Fleet {
+    /// A fleet that flies for so long \[s of mission time\].
+    fn under_way(duration_s: f64) -> Fleet {
+        let ground = Ground::new();
+        let text = with(&mission_text(MISSION), "duration_s = 3000.0", &format!("duration_s = {duration_s:?}"));
+        ground.file("mission.toml", &text);
+        let (emulator, endpoint) = ground.emulator(&lasting_endpoint());
+        let vehicles = IDS.iter().map(|id| ground.vehicle(id, &endpoint)).collect();
+        let control = conduct(&ground, &endpoint, "run");
+        let logs = format!("logs/{:016x}", digest(&text));
+        let fleet = Fleet { endpoint, emulator, vehicles, control, logs, ground };
+        fleet.status_until("the fleet is under way", |status| status["phase"] == "running" && now(status) > 15.0);
+        fleet
+    }
+
+    fn status_until(&self, what: &str, is_such: impl Fn(&Value) -> bool) -> Value {
+        self.ground.status_until(&self.endpoint, what, is_such)
+    }
+
+    /// Waits until the fleet has flown on for a while.
+    fn flies_on(&self, seconds: f64) -> f64 {
+        let from = now(&self.status_until("the fleet answers", |_| true));
+        now(&self.status_until("the fleet flies on", |status| now(status) > from + seconds))
+    }
+
+    /// Ends the flight; the run folder is complete afterwards.
+    fn stop(&mut self) {
+        assert_eq!(self.ground.controlled(0, &["stop", "--attach", &self.endpoint]), "stopped\n");
+        self.control.ends_with(1);
+    }
+
+    /// What the programs had to say, as the run folder keeps it.
+    fn notes(&self, run: &str) -> String {
+        let clock = self.ground.json(&format!("{run}/clock.json"));
+        let notes = clock["notes"].as_array().expect("notes").iter();
+        notes.map(|note| format!("{}: {}\n", note["source"], note["text"])).collect()
+    }
+
+    /// ξ_a − ξ_id at the end of the recording.
+    fn apart_at_last(&self, run: &str, id: &str) -> f64 {
+        cpf_tests::apart_at_last(&self.ground.recording(run).exact, "a", id)
+    }
+}
+
+/// Mission-control for the fleet at an endpoint.
+fn conduct(ground: &Ground, endpoint: &str, out: &str) -> Process {
+    ground.control(&["run", "mission.toml", "--attach", endpoint, "--speed-up", "10", "--out", out])
+}
+
+/// Asserts that a vehicle flew from the start to the end.
+fn assert_flown(rows: &[&StateRow], end_s: f64) {
+    let (first, last) = (rows[0].t_ns as f64 / 1e9, rows[rows.len() - 1].t_ns as f64 / 1e9);
+    assert!(first < 5.0 && last == end_s, "{} flew from {first} to {last} s", rows[0].vehicle);
+}
+
+fn now(status: &Value) -> f64 {
+    status["now_s"].as_f64().expect("a time")
+}
+
+fn is_flying(status: &Value, id: &str) -> bool {
+    let vehicle = of_vehicle(status, id);
+    vehicle["connected"] == true && vehicle["phase"] == "running"
+}
+
+#[test]
+fn a_vehicle_that_is_killed_rejoins_where_the_others_are() {
+    let mut fleet = Fleet::under_way(3000.0);
+    let file = fleet.ground.path(&format!("{}/b.mcap", fleet.logs));
+    until(PATIENCE, "b has recorded something", || fs::metadata(&file).is_ok_and(|m| m.len() > 2000));
+    fleet.vehicles[1].kill();
+    let status = fleet.status_until("b is missed", |status| of_vehicle(status, "b")["connected"] == false);
+    let killed_s = now(&status);
+    assert!(is_flying(&status, "a") && is_flying(&status, "c"), "{status}");
+    fleet.flies_on(10.0);
+    let cut = bus::recording::read(&file).expect("what was recorded before the kill is readable");
+    assert!(!cut.complete && !states(&cut.exact, "b").is_empty());
+
+    fleet.vehicles[1] = fleet.ground.vehicle("b", &fleet.endpoint);
+    let status = fleet.status_until("b is back", |status| is_flying(status, "b"));
+    let back_s = now(&status);
+    fleet.flies_on(20.0);
+    fleet.stop();
+
+    // Both lives are in the run folder, and nothing between.
+    let recording = fleet.ground.recording("run");
+    let lives = states(&recording.exact, "b");
+    let instants: Vec<f64> = lives.iter().map(|row| row.t_ns as f64 / 1e9).collect();
+    let (first, last) = (instants[0], instants[instants.len() - 1]);
+    assert!(first < 5.0 && last > back_s, "{first} to {last}, back at {back_s}");
+    let gap = instants.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    assert!(gap > 5.0, "killed at {killed_s} and back at {back_s}, but no gap longer than {gap}");
+    // Back at the others' place soon: at v_L the fleet went further than this in the gap.
+    let apart = fleet.apart_at_last("run", "b");
+    assert!(apart.abs() < 0.5, "{apart}");
+    let notes = fleet.notes("run");
+    assert!(notes.contains("lost the line to b") && notes.contains("b joins the flight under way"), "{notes}");
+}
+
+#[test]
+fn a_fleet_flies_on_without_its_emulator_and_takes_it_back() {
+    let mut fleet = Fleet::under_way(250.0);
+    fleet.emulator.kill();
+    for vehicle in &fleet.vehicles {
+        until(PATIENCE, "the vehicle misses the emulator", || vehicle.stderr().contains("lost the network-emulator"));
+    }
+    let (emulator, endpoint) = fleet.ground.emulator(&fleet.endpoint);
+    assert_eq!(endpoint, fleet.endpoint);
+    fleet.emulator = emulator;
+    let status = fleet.status_until("everyone is back", |status| {
+        status["phase"] == "running" && IDS.iter().all(|id| is_flying(status, id))
+    });
+    assert!(now(&status) > 15.0 && now(&status) < 250.0, "{status}");
+    fleet.control.ends_with(0);
+    let recording = fleet.ground.recording("run");
+    for id in IDS {
+        let rows = states(&recording.exact, id);
+        assert_flown(&rows, 250.0);
+        assert!(fleet.apart_at_last("run", id).abs() < 0.1);
+    }
+    let notes = fleet.notes("run");
+    assert!(notes.contains("the emulator came back at"), "{notes}");
+    let report = fs::read_to_string(fleet.ground.path("run/report.html")).expect("a report");
+    assert!(report.contains("the emulator came back at"), "the report tells of it");
+}
+
+#[test]
+fn a_fleet_finishes_without_mission_control_and_another_one_collects() {
+    let mut fleet = Fleet::under_way(200.0);
+    fleet.control.kill();
+    let status = fleet.status_until("the fleet answers", |_| true);
+    assert!(IDS.iter().all(|id| is_flying(&status, id)), "{status}");
+    fleet.control = conduct(&fleet.ground, &fleet.endpoint, "second");
+    fleet.control.ends_with(0);
+    let recording = fleet.ground.recording("second");
+    for id in IDS {
+        let rows = states(&recording.exact, id);
+        assert_flown(&rows, 200.0);
+        assert!(fleet.apart_at_last("second", id).abs() < 0.1);
+    }
+    let summary = fleet.ground.json("second/summary.json");
+    assert_eq!(summary["complete"], true);
+    assert_eq!(summary["fleet"]["messages"]["balanced"], true);
+}
+
+#[test]
+fn the_formation_speed_changes_under_way_and_stop_ends_the_flight() {
+    let mut fleet = Fleet::under_way(3000.0);
+    let said = fleet.ground.controlled(0, &["speed", "0.8", "--attach", &fleet.endpoint]);
+    assert!(said.starts_with("formation speed 0.8 from "), "{said}");
+    fleet.status_until("the speed is taken", |status| status["speed"] == 0.8);
+    fleet.flies_on(40.0);
+    fleet.stop();
+    let status = fleet.status_until("all have stopped", |status| status["phase"] == "aborted");
+    assert!(IDS.iter().all(|id| of_vehicle(&status, id)["phase"] == "aborted"), "{status}");
+    let summary = fleet.ground.json("run/summary.json");
+    assert_eq!(summary["fleet"]["formation_speed"], 0.8);
+    let recording = fleet.ground.recording("run");
+    for id in IDS {
+        let rows = states(&recording.exact, id);
+        let end = rows[rows.len() - 1];
+        let before = state_at(&recording.exact, id, end.t_ns as f64 / 1e9 - 5.0);
+        let speed = (end.xi - before.xi) / ((end.t_ns - before.t_ns) as f64 / 1e9);
+        assert!((speed - 0.8).abs() < 0.05, "{id} flies at {speed}");
+    }
+    // Nothing is under way any more.
+    for command in [&["speed", "0.5"][..], &["stop"]] {
+        let mut refused = fleet.ground.control(&[command, &["--attach", &fleet.endpoint]].concat());
+        refused.ends_with(1);
+        assert!(refused.stderr().starts_with("no flight is under way"), "{}", refused.stderr());
+    }
+}
+
+#[test]
+fn a_vehicle_that_was_frozen_comes_back_into_line() {
+    let mut fleet = Fleet::under_way(3000.0);
+    fleet.vehicles[2].freeze();
+    // The emulator holds it for dead after two seconds of silence.
+    let status = fleet.status_until("c is missed", |status| of_vehicle(status, "c")["connected"] == false);
+    assert!(is_flying(&status, "a") && is_flying(&status, "b"), "{status}");
+    fleet.flies_on(10.0);
+    fleet.vehicles[2].thaw();
+    fleet.status_until("c is back", |status| is_flying(status, "c"));
+    fleet.flies_on(30.0);
+    fleet.stop();
+    let apart = fleet.apart_at_last("run", "c");
+    assert!(apart.abs() < 0.5, "{apart}");
+    let missed = fleet.ground.json("run/clock.json")["deadlines"]
+        .as_array()
+        .and_then(|all| all.iter().find(|one| one["vehicle"] == "c")?["missed"].as_u64());
+    assert!(missed.is_some_and(|missed| missed >= 200), "two seconds at 50 ms, ten times as fast: {missed:?}");
+}
