@@ -1,0 +1,499 @@
+//! The system as a whole, measured. Build the programs first:
+//!
+//! ```text
+//! cargo build --release && cargo bench -p cpf-tests --bench system -- [simulate] [stepped] [hop] [throughput] [delay] [fleet]
+//! ```
+//!
+//! Without a name, all are run, in two minutes or so. Rows are for docs/benchmarks.md. Medians count; on a shared machine the tails say more about
+//! the machine than about the programs, so every figure with a comparison is taken in alternation with it.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use bus::Plane;
+use bus::line::{Line, LineConfig, LineEvent};
+use bus::setup::Endpoint;
+use common::mission::Mission;
+use common::record::{ClockRecord, Row};
+use common::time::Time;
+use common::wire::fleet::{FromFleet, Pace, ToFleet};
+use common::wire::state::CoordinationState;
+use common::wire::vehicle::{FromVehicle, Phase, ToVehicle};
+use cpf_tests::{Ground, mission, mission_text, program};
+use zenoh::Wait;
+
+fn main() {
+    let names: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    if names.first().is_some_and(|name| name == "plain-router") {
+        return plain_router();
+    }
+    let wanted = |name: &str| names.is_empty() || names.iter().any(|n| n == name);
+    println!("| what | figure |\n|---|---|");
+    for (name, bench) in [
+        ("simulate", simulate as fn()),
+        ("stepped", stepped),
+        ("hop", hop),
+        ("throughput", throughput),
+        ("delay", delay),
+        ("fleet", fleet),
+    ] {
+        if wanted(name) {
+            bench();
+        }
+    }
+}
+
+fn row(what: &str, figure: &str) {
+    println!("| {what} | {figure} |");
+}
+
+fn percentile(sorted: &[f64], p: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * p).round() as usize]
+}
+
+fn sorted(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+fn median(values: Vec<f64>) -> f64 {
+    percentile(&sorted(values), 0.5)
+}
+
+/// Processor seconds that this process has used so far.
+fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux");
+    let after_name = stat.rsplit(')').next().expect("a stat line");
+    let ticks: Vec<f64> = after_name.split_whitespace().skip(11).take(2).filter_map(|t| t.parse().ok()).collect();
+    ticks.iter().sum::<f64>() / 100.0
+}
+
+// --- one thread --------------------------------------------------------------------------------------------------------
+
+/// Vehicle-seconds per processor-second of `simulate`, of the machines alone and with the recording written.
+fn simulate() {
+    let mission = mission(&mission_text("missions/auv-helix.toml"));
+    let flown = mission.end.secs() * mission.vehicles.len() as f64;
+    let per_cpu = |work: &dyn Fn()| {
+        let of = |runs: u32| {
+            let begun = cpu_seconds();
+            (0..runs).for_each(|_| work());
+            flown * f64::from(runs) / (cpu_seconds() - begun)
+        };
+        median((0..5).map(|_| of(20)).collect())
+    };
+    let machines = per_cpu(&|| {
+        let outcome = mission_control::simulate::simulate(&mission, |_| {}, |_| true).expect("flies");
+        assert_eq!(outcome.phase, Phase::Finished);
+    });
+    row(
+        "`simulate` auv-helix, machines and rows, nothing written",
+        &format!("{machines:.0} vehicle-seconds per CPU-second"),
+    );
+    let ground = Ground::new();
+    let file = AtomicU64::new(0);
+    let recorded = per_cpu(&|| {
+        let path = ground.path(&format!("r{}.mcap", file.fetch_add(1, Ordering::Relaxed)));
+        mission_control::rehearse::record(&mission, &path, |_| {}).expect("flies");
+        std::fs::remove_file(path).expect("was written");
+    });
+    row("the same with the recording written", &format!("{recorded:.0} vehicle-seconds per CPU-second"));
+}
+
+// --- stepped processes -------------------------------------------------------------------------------------------------
+
+fn flown_in(ground: &Ground, mission: &Path, name: &str, extra: &[&str]) -> f64 {
+    let out = ground.path(name);
+    let begun = Instant::now();
+    let status = Command::new(program("mission-control"))
+        .arg("run")
+        .arg(mission)
+        .args(extra)
+        .arg("--out")
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .expect("runs");
+    assert!(status.success(), "{name} failed");
+    begun.elapsed().as_secs_f64()
+}
+
+/// A mission of `n` wheeled robots abreast, each hearing the two beside it.
+fn abreast(n: usize, duration: f64, delay: &str, record: f64) -> String {
+    let mut text = format!(
+        "name = \"abreast\"\nduration_s = {duration:?}\n[clock]\ncontrol_period_s = 0.05\nrecord_period_s = {record:?}\n\
+         [formation]\nspeed = 0.5\n[coordination]\nlaw = {{ switching = {{ gain = 0.2 }} }}\nmessage_period_s = 0.1\n\
+         [network]\nlinks = ["
+    );
+    for i in 0..n {
+        text += &format!("[\"v{i}\", \"v{}\"], ", (i + 1) % n);
+    }
+    text += &format!(
+        "]\n{delay}\n[fleet]\nmodel = {{ dynamic_unicycle = {{}} }}\nfollowing = {{ proposition31 = {{}} }}\n"
+    );
+    for i in 0..n {
+        text += &format!(
+            "[[vehicles]]\nid = \"v{i}\"\npath = {{ line = {{ start_m = [0.0, {i}.0] }} }}\nstart = {{ x_m = {:?}, y_m = {i}.3 }}\n",
+            0.1 * i as f64
+        );
+    }
+    text
+}
+
+fn stepped() {
+    let ground = Ground::new();
+    let helix = ground.file("helix.toml", &mission_text("missions/auv-helix.toml"));
+    let wall = median((0..5).map(|i| flown_in(&ground, &helix, &format!("h{i}"), &["--stepped"])).collect());
+    row(
+        "stepped run of auv-helix, 5 processes, start to report",
+        &format!("{wall:.2} s, {:.0} times real time", 800.0 / wall),
+    );
+    let eight = ground.file("eight.toml", &abreast(8, 200.0, "", 0.5));
+    let wall = median((0..3).map(|i| flown_in(&ground, &eight, &format!("e{i}"), &["--stepped"])).collect());
+    row(
+        "stepped run of 8 vehicles without delay (an exchange every 0.1 s), start to report",
+        &format!("{:.0} vehicle-seconds per second", 8.0 * 200.0 / wall),
+    );
+}
+
+// --- one hop -----------------------------------------------------------------------------------------------------------
+
+/// The plain comparison: a Zenoh router in a process of its own, of the same version and features.
+fn plain_router() {
+    let mut config = zenoh::Config::default();
+    let port = std::env::args().nth(2).expect("a port");
+    for (key, value) in [
+        ("mode", "\"router\"".to_string()),
+        ("listen/endpoints", format!("[\"tcp/127.0.0.1:{port}\"]")),
+        ("scouting/multicast/enabled", "false".into()),
+        ("scouting/gossip/enabled", "false".into()),
+        ("scouting/delay", "0".into()),
+    ] {
+        config.insert_json5(key, &value).expect("a known key");
+    }
+    let _session = zenoh::open(config).wait().expect("opens");
+    println!("up");
+    std::thread::park();
+}
+
+struct Plain {
+    router: Child,
+    put: Box<dyn Fn(&[u8])>,
+    _sessions: Vec<zenoh::Session>,
+}
+
+impl Drop for Plain {
+    fn drop(&mut self) {
+        let _ = self.router.kill();
+        let _ = self.router.wait();
+    }
+}
+
+/// Two plain clients of a plain router; what the second receives goes to `heard`.
+fn plain(heard: impl Fn(&[u8]) + Send + Sync + 'static) -> Plain {
+    let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = free.local_addr().expect("bound").port();
+    drop(free);
+    let router = Command::new(std::env::current_exe().expect("myself"))
+        .args(["plain-router", &port.to_string()])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let client = || {
+        let config = format!(
+            "{{ mode: \"client\", connect: {{ endpoints: [\"tcp/127.0.0.1:{port}\"], timeout_ms: 10000 }}, \
+             scouting: {{ multicast: {{ enabled: false }}, gossip: {{ enabled: false }} }} }}"
+        );
+        zenoh::open(zenoh::Config::from_json5(&config).expect("sound")).wait().expect("opens")
+    };
+    let (sender, receiver) = (client(), client());
+    receiver
+        .declare_subscriber("plain")
+        .callback(move |s| heard(&s.payload().to_bytes()))
+        .background()
+        .wait()
+        .expect("ok");
+    let publisher = sender
+        .declare_publisher("plain")
+        .congestion_control(zenoh::qos::CongestionControl::Drop)
+        .wait()
+        .expect("declares");
+    let deadline = Instant::now() + Duration::from_secs(10);
+    while !publisher.matching_status().wait().expect("status").matching() && Instant::now() < deadline {
+        std::thread::yield_now();
+    }
+    let put = Box::new(move |bytes: &[u8]| publisher.put(bytes.to_vec()).wait().expect("puts"));
+    Plain { router, put, _sessions: vec![sender, receiver] }
+}
+
+/// The emulator with a flight of two vehicles under way, both played by this process.
+struct Emulated {
+    _ground: Ground,
+    mission: Arc<Mission>,
+    sender: Line,
+    _receiver: Line,
+    _control: Line,
+    folder: std::path::PathBuf,
+    emulator: Child,
+    seq: std::cell::Cell<u32>,
+}
+
+impl Emulated {
+    fn new(network: &str, heard: impl Fn(Vec<u8>, Instant) + Send + 'static) -> Emulated {
+        let ground = Ground::new();
+        let text =
+            abreast(2, 100_000.0, network, 0.5).replace("[\"v0\", \"v1\"], [\"v1\", \"v0\"], ", "[\"v0\", \"v1\"]");
+        let mission = mission(&text);
+        let folder = ground.path("logs");
+        let mut emulator = Command::new(program("network-emulator"))
+            .args(["--listen", "tcp/127.0.0.1:0", "--logs"])
+            .arg(&folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("starts");
+        let mut line = String::new();
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(emulator.stdout.take().expect("piped")), &mut line)
+            .expect("says where");
+        let endpoint: Endpoint = line.trim().parse().expect("an endpoint");
+        let join = |id: &str| Line::connect(LineConfig::new(endpoint.clone(), id)).expect("joins");
+        let ((sender, from_0), (receiver, from_1), (control, from_hub)) =
+            (join("v0"), join("v1"), join("mission-control"));
+        for line in [&sender, &receiver] {
+            say(line, &FromVehicle::Hello { phase: Phase::Idle, flight: None });
+        }
+        control.send(Plane::Mission, &common::wire::encode(&ToFleet::Upload { mission: text })).expect("sent");
+        for (line, events) in [(&sender, &from_0), (&receiver, &from_1)] {
+            wait_for(events, |m: ToVehicle| matches!(m, ToVehicle::Arm { .. }));
+            say(line, &FromVehicle::Armed { digest: mission.digest });
+        }
+        loop {
+            let start = ToFleet::Start { pace: Pace::Real { speed_up: 1.0 } };
+            control.send(Plane::Mission, &common::wire::encode(&start)).expect("sent");
+            control.send(Plane::Mission, &common::wire::encode(&ToFleet::Status)).expect("sent");
+            let mut running = false;
+            wait_for(&from_hub, |m: FromFleet| {
+                if let FromFleet::Status(status) = &m {
+                    running = status.phase == Phase::Running && status.now > Time::ZERO;
+                }
+                matches!(m, FromFleet::Status(_))
+            });
+            if running {
+                break;
+            }
+        }
+        std::thread::spawn(move || {
+            for event in from_1 {
+                if let LineEvent::Packet { plane: Plane::State, at, bytes } = event {
+                    heard(bytes, at);
+                }
+            }
+        });
+        std::thread::spawn(move || from_0.into_iter().for_each(drop));
+        Emulated {
+            _ground: ground,
+            mission,
+            sender,
+            _receiver: receiver,
+            _control: control,
+            folder,
+            emulator,
+            seq: std::cell::Cell::new(0),
+        }
+    }
+
+    fn send(&self) -> u32 {
+        let seq = self.seq.get();
+        self.seq.set(seq + 1);
+        let state = CoordinationState {
+            mission: self.mission.digest,
+            sender: 0,
+            seq,
+            made: Time::ZERO,
+            xi: 1.0,
+            eta_over_r: None,
+        };
+        let _ = self.sender.send(Plane::State, &state.encode());
+        seq
+    }
+}
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        let _ = self.emulator.kill();
+        let _ = self.emulator.wait();
+    }
+}
+
+fn say(line: &Line, message: &FromVehicle) {
+    line.send(Plane::Mission, &common::wire::encode(message)).expect("sent");
+}
+
+fn wait_for<M: bincode::Decode<()>>(events: &Receiver<LineEvent>, mut is_it: impl FnMut(M) -> bool) {
+    loop {
+        match events.recv_timeout(Duration::from_secs(10)).expect("an answer") {
+            LineEvent::Packet { plane: Plane::Mission, bytes, .. } => {
+                if common::wire::decode::<M>(&bytes).is_ok_and(&mut is_it) {
+                    return;
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// One-way latency at 1000 messages per second, alternating between the plain router and the emulator.
+fn hop() {
+    let (plain_heard, plain_times) = channel();
+    let plain = plain(move |_| drop(plain_heard.send(Instant::now())));
+    let (emulated_heard, emulated_times) = channel();
+    let emulated = Emulated::new("", move |_, at| drop(emulated_heard.send(at)));
+    let (mut of_plain, mut of_emulated) = (Vec::new(), Vec::new());
+    let begun = Instant::now();
+    for i in 0..6000u32 {
+        let due = begun + Duration::from_micros(1000) * i;
+        while Instant::now() < due {
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+        let sent = Instant::now();
+        let received = if i % 2 == 0 {
+            (plain.put)(&[7; 35]);
+            plain_times.recv_timeout(Duration::from_secs(2))
+        } else {
+            emulated.send();
+            emulated_times.recv_timeout(Duration::from_secs(2))
+        };
+        if let Ok(received) = received {
+            let latency = received.duration_since(sent).as_secs_f64() * 1e6;
+            if i % 2 == 0 { of_plain.push(latency) } else { of_emulated.push(latency) }
+        }
+    }
+    let (p, e) = (sorted(of_plain), sorted(of_emulated));
+    let show = |v: &[f64]| format!("{:.0} / {:.0} µs", percentile(v, 0.5), percentile(v, 0.99));
+    row("one hop through a plain Zenoh router, p50 / p99", &show(&p));
+    row("one hop through the emulator, in alternation, p50 / p99", &show(&e));
+    row("ratio at the median", &format!("{:.2}", percentile(&e, 0.5) / percentile(&p, 0.5)));
+}
+
+/// Messages delivered per second, flat out for two seconds each, in alternation.
+fn throughput() {
+    let counter = || Arc::new(AtomicU64::new(0));
+    let (of_plain, of_emulated) = (counter(), counter());
+    let (p, e) = (of_plain.clone(), of_emulated.clone());
+    let plain = plain(move |_| drop(p.fetch_add(1, Ordering::Relaxed)));
+    let emulated = Emulated::new("queue = 1000000", move |_, _| drop(e.fetch_add(1, Ordering::Relaxed)));
+    let measure = |count: &AtomicU64, send: &dyn Fn()| {
+        let before = count.load(Ordering::Relaxed);
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_secs(2) {
+            (0..32).for_each(|_| send());
+        }
+        (count.load(Ordering::Relaxed) - before) as f64 / begun.elapsed().as_secs_f64()
+    };
+    let (mut plain_rates, mut emulated_rates) = (Vec::new(), Vec::new());
+    for _ in 0..3 {
+        plain_rates.push(measure(&of_plain, &|| (plain.put)(&[7; 35])));
+        emulated_rates.push(measure(&of_emulated, &|| drop(emulated.send())));
+        // What still waits belongs to neither.
+        let mut last = u64::MAX;
+        while last != of_emulated.load(Ordering::Relaxed) {
+            last = of_emulated.load(Ordering::Relaxed);
+            std::thread::sleep(Duration::from_millis(200));
+        }
+    }
+    let (p, e) = (median(plain_rates), median(emulated_rates));
+    row("delivered per second through a plain router, flat out", &format!("{p:.0}"));
+    row("delivered per second through the emulator, flat out", &format!("{e:.0}"));
+    row("ratio", &format!("{:.2}", e / p));
+}
+
+/// Achieved minus commanded delay, as the emulator records it for every message.
+fn delay() {
+    for (name, seconds) in [("5 ms", 0.005), ("100 ms", 0.1), ("1 s", 1.0)] {
+        let network = format!("delay = {{ constant = {{ delay_s = {seconds:?} }} }}");
+        let emulated = Emulated::new(&network, |_, _| {});
+        let begun = Instant::now();
+        for i in 0..3000u32 {
+            let due = begun + Duration::from_micros(1000) * i;
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            emulated.send();
+        }
+        std::thread::sleep(Duration::from_secs_f64(seconds + 1.5));
+        let folder = emulated.folder.join(format!("{:016x}", emulated.mission.digest));
+        let recording = bus::recording::read(folder.join("network-emulator.mcap")).expect("readable while written");
+        let late: Vec<f64> = recording
+            .clock
+            .iter()
+            .filter_map(|row| match row {
+                ClockRecord::Achieved(row) => Some(row.late_ns as f64 / 1e3),
+                _ => None,
+            })
+            .collect();
+        let n = late.len();
+        let late = sorted(late);
+        row(
+            &format!("achieved minus commanded, {name}, 1000/s ({n} messages): least / p50 / p99"),
+            &format!("{:.0} / {:.0} / {:.0} µs", late[0], percentile(&late, 0.5), percentile(&late, 0.99)),
+        );
+    }
+    let _ = |row: Row| row;
+}
+
+/// Fifty vehicle processes in real time for a minute.
+fn fleet() {
+    let ground = Ground::new();
+    let file = ground.file("fifty.toml", &abreast(50, 60.0, "", 5.0));
+    let out = ground.path("fifty");
+    let mut run = Command::new(program("mission-control"))
+        .args(["run", "--listen", "tcp/127.0.0.1:0"])
+        .arg(&file)
+        .arg("--out")
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("starts");
+    std::thread::sleep(Duration::from_secs(40));
+    let memory = fleet_memory(run.id());
+    assert!(run.wait().expect("ends").success());
+    let clock: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("clock.json")).expect("written")).expect("JSON");
+    let sum = |key: &str| {
+        clock["deadlines"].as_array().into_iter().flatten().filter_map(|d| d[key].as_u64()).sum::<u64>() as f64
+    };
+    let (met, missed) = (sum("met"), sum("missed"));
+    row(
+        "50 vehicle processes, 20 Hz control, 10 Hz messages, 60 s in real time: missed deadlines",
+        &format!("{missed:.0} of {:.0} ({:.3} %)", met + missed, 100.0 * missed / (met + missed)),
+    );
+    row("memory of a vehicle process there, resident / proportional, median", &memory);
+}
+
+/// Resident and proportional memory of the vehicle processes below a process.
+fn fleet_memory(parent: u32) -> String {
+    let children = std::fs::read_to_string(format!("/proc/{parent}/task/{parent}/children")).unwrap_or_default();
+    let (mut rss, mut pss) = (Vec::new(), Vec::new());
+    for pid in children.split_whitespace() {
+        let command = std::fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        let rollup = std::fs::read_to_string(format!("/proc/{pid}/smaps_rollup")).unwrap_or_default();
+        let field = |name: &str| {
+            let line = rollup.lines().find(|line| line.starts_with(name))?;
+            line.split_whitespace().nth(1)?.parse::<f64>().ok()
+        };
+        if command.contains("vehicle-node")
+            && let (Some(r), Some(p)) = (field("Rss:"), field("Pss:"))
+        {
+            rss.push(r / 1024.0);
+            pss.push(p / 1024.0);
+        }
+    }
+    if rss.is_empty() {
+        return "not measured".to_string();
+    }
+    format!("{:.1} / {:.1} MB ({} processes)", median(rss.clone()), median(pss), rss.len())
+}
