@@ -73,7 +73,7 @@ impl Logs {
         let mut last = None;
         if fresh {
             for file in &earlier {
-                fs::remove_file(file).map_err(|error| refused(&error))?;
+                set_aside(file).map_err(|error| refused(&error))?;
             }
         } else {
             last = earlier.iter().rev().find_map(|file| last_state(file));
@@ -154,6 +154,15 @@ fn write_rows(mut recorder: Recorder<std::io::BufWriter<File>>, queue: &Receiver
         }
         recorder.flush_if_due(Instant::now()).map_err(broken)?;
     }
+}
+
+/// Moves a file into the folder `earlier` beside it, under a name that is free.
+fn set_aside(file: &Path) -> std::io::Result<()> {
+    let folder = file.with_file_name("earlier");
+    fs::create_dir_all(&folder)?;
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let free = (1..).map(|n| folder.join(format!("{stem}.{n}.mcap"))).find(|path| !path.exists());
+    free.map_or(Ok(()), |path| fs::rename(file, path))
 }
 
 fn read_piece(path: &Path, offset: u64) -> std::io::Result<(u64, Vec<u8>)> {

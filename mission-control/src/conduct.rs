@@ -2,8 +2,10 @@
 //! start, watch, and collect the logs. `now` is the time since mission-control began.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use common::machine::Machine;
+use common::mission::Mission;
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
 use common::wire::vehicle::{LogPiece, Phase};
@@ -72,8 +74,7 @@ pub enum Step {
 
 /// A flight as mission-control conducts it.
 pub struct Conduct {
-    mission: String,
-    digest: u64,
+    mission: Arc<Mission>,
     pace: Pace,
     /// How long to wait until every vehicle is armed.
     patience: Option<Span>,
@@ -99,11 +100,10 @@ struct Wanted {
 
 impl Conduct {
     /// The flight of this mission file.
-    pub fn new(mission: &str, pace: Pace, patience: Option<Span>, collects: bool) -> Conduct {
+    pub fn new(mission: Arc<Mission>, pace: Pace, patience: Option<Span>, collects: bool) -> Conduct {
         Conduct {
             collects,
-            digest: common::mission::digest(mission),
-            mission: mission.to_string(),
+            mission,
             pace,
             patience,
             step: Step::Contact,
@@ -141,21 +141,26 @@ impl Conduct {
 
     fn status(&mut self, now: Time, status: FleetStatus) {
         self.outputs.push_back(ConductOutput::Progress(self.step, Some(status.clone())));
-        let same = status.mission == self.mission;
+        let same = status.mission == self.mission.text;
         match self.step {
             Step::Contact if status.phase == Phase::Running && !same => {
                 let reason = "the fleet is flying another mission; stop it first (mission-control stop)";
                 self.fail(reason.to_string());
             }
             Step::Contact if status.phase == Phase::Running => self.enter(Step::Flying, now),
+            // A flight of this mission ended while no mission-control was there to collect it.
+            Step::Contact if self.collects && same && is_over(status.phase) && !status.collected => {
+                self.enter(Step::Flying, now);
+                self.flying(now, &status, true);
+            }
             Step::Contact => {
-                let mission = self.mission.clone();
+                let mission = self.mission.text.clone();
                 self.send(ToFleet::Upload { mission });
                 self.enter(Step::Arming, now);
             }
             Step::Arming if same => self.arming(now, &status),
             Step::Starting if same && status.phase == Phase::Running => self.enter(Step::Flying, now),
-            Step::Starting if same && matches!(status.phase, Phase::Finished | Phase::Aborted) => {
+            Step::Starting if same && is_over(status.phase) => {
                 self.over(now, &status);
             }
             Step::Flying => self.flying(now, &status, same),
@@ -181,9 +186,9 @@ impl Conduct {
         }
     }
 
-    /// Whether a vehicle belongs to this mission: its id is in the file.
+    /// Whether a vehicle belongs to this mission.
     fn concerns(&self, id: &str) -> bool {
-        self.mission.contains(&format!("\"{id}\""))
+        self.mission.index_of(id).is_some()
     }
 
     fn flying(&mut self, now: Time, status: &FleetStatus, same: bool) {
@@ -194,7 +199,7 @@ impl Conduct {
             }
             return;
         }
-        if !matches!(status.phase, Phase::Finished | Phase::Aborted) {
+        if !is_over(status.phase) {
             return;
         }
         let still_flying = status.vehicles.iter().any(|v| v.connected && v.phase == Phase::Running);
@@ -238,7 +243,7 @@ impl Conduct {
             if wanted.tries <= PIECE_TRIES {
                 wanted.asked = Some(now);
                 let (who, file, offset) = (wanted.who.clone(), wanted.file, wanted.offset);
-                let digest = self.digest;
+                let digest = self.mission.digest;
                 return self.send(ToFleet::SendLog { who, digest, file, offset });
             }
             let who = wanted.who.clone();
@@ -276,6 +281,10 @@ impl Conduct {
         }
         self.collect(now);
     }
+}
+
+fn is_over(phase: Phase) -> bool {
+    matches!(phase, Phase::Finished | Phase::Aborted)
 }
 
 impl Machine for Conduct {

@@ -6,6 +6,7 @@ use std::time::SystemTime;
 
 use bus::recording::{Recording, read};
 use common::mission::Mission;
+use common::record::Record;
 use serde::Serialize;
 
 use crate::facts::facts;
@@ -97,9 +98,13 @@ pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
 pub fn report(folder: &Path, notes: Vec<String>) -> Result<Summary, String> {
     let recording = recording(folder)?;
     let mission = Mission::parse(MISSION, &recording.mission_toml).map_err(|faults| faults.to_string())?;
+    let mut facts = facts(&mission);
+    // A flight that was ended early is measured over what was flown.
+    let flown = recording.exact.iter().filter(|row| matches!(row, Record::State(_))).map(Record::t_ns).max();
+    facts.duration_s = flown.map_or(facts.duration_s, |t| (t as f64 / 1e9).min(facts.duration_s));
     let reproduce = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
     let account = Account { notes, reproduce };
-    write_run_folder(folder, &recording, &facts(&mission), |summary| theory::rows(&mission, Some(summary)), &account)
+    write_run_folder(folder, &recording, &facts, |summary| theory::rows(&mission, Some(summary)), &account)
         .map_err(|error| format!("cannot write the report: {error}"))
 }
 

@@ -78,21 +78,27 @@ pub enum Failure {
 /// # Errors
 /// Why there is no flight to report on.
 pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
-    let folder = folder::make(plan.out.as_deref(), &plan.mission).map_err(Failure::Files)?;
+    let make_folder = || folder::make(plan.out.as_deref(), &plan.mission).map_err(Failure::Files);
     let begun = Instant::now();
     let own = plan.attach.is_none();
     let stop = StopFlag::on_signals();
-    let (endpoint, mut processes) = match &plan.attach {
-        Some(endpoint) => (endpoint.clone(), Processes::default()),
-        None => Processes::start(&plan.mission, &folder, plan.listen.clone())?,
+    let (endpoint, mut processes, folder) = match &plan.attach {
+        Some(endpoint) => (endpoint.clone(), Processes::default(), None),
+        None => {
+            let folder = make_folder()?;
+            let (endpoint, processes) = Processes::start(&plan.mission, &folder, plan.listen.clone())?;
+            (endpoint, processes, Some(folder))
+        }
     };
     let mut config = LineConfig::new(endpoint.clone(), COLLECTOR);
     config.patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
     let (line, events) = Line::connect(config).map_err(|error| Failure::Unreachable(error.to_string()))?;
     stop.arm();
+    // A fleet that cannot be reached leaves no folder behind.
+    let folder = folder.map_or_else(make_folder, Ok)?;
     let patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
     let patience = patience.map(|p| Span::from_secs(p.as_secs_f64()));
-    let mut conduct = Conduct::new(&plan.mission.text, plan.pace, patience, !own);
+    let mut conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !own);
     let mut port = ConductPort {
         line,
         own,

@@ -73,7 +73,7 @@ pub fn simulate_with(
         mission,
         hub,
         nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::new(&vehicle.id)).collect(),
-        conduct: Conduct::new(&mission.text, Pace::Stepped, None, false),
+        conduct: Conduct::new(mission.clone(), Pace::Stepped, None, false),
         events: VecDeque::new(),
         now: Time::ZERO,
         outcome: None,

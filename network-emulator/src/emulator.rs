@@ -201,7 +201,7 @@ impl Emulator {
             let order = self.counter;
             self.counter += 1;
             let message = UnderWay { due, order, link: index, number, sent: now, bytes: bytes.clone() };
-            if link.stream.unit_at(u64::from(state.seq), 0) < link.loss {
+            if link.loss > 0.0 && link.stream.unit_at(u64::from(state.seq), 0) < link.loss {
                 self.settle(now, &message, Fate::Lost);
             } else if link.places.len() >= self.mission.queue {
                 self.settle(now, &message, Fate::QueueFull);

@@ -135,6 +135,8 @@ struct Load {
     speeds: Vec<SpeedCommand>,
     /// Taken over from a vehicle after the hub lost its memory.
     adopted: bool,
+    /// Its logs are where they belong.
+    collected: bool,
     now: Time,
 }
 
@@ -217,6 +219,9 @@ impl Hub {
                 for id in ids {
                     self.tell_vehicle(&id, ToVehicle::Dismiss);
                 }
+                if let Some(load) = &mut self.load {
+                    load.collected = true;
+                }
                 self.outputs.push_back(HubOutput::Dismissed);
             }
             ToFleet::SendLog { who, digest, file, offset } if who == HUB => {
@@ -267,6 +272,7 @@ impl Hub {
             end: load.map_or(Time::ZERO, |load| load.mission.end),
             speed,
             vehicles,
+            collected: load.is_some_and(|load| load.collected),
             messages: self.totals(),
         };
         self.answer(FromFleet::Status(status));
@@ -310,6 +316,7 @@ impl Hub {
             lockstep: None,
             speeds: Vec::new(),
             adopted,
+            collected: false,
             now: Time::ZERO,
         });
     }

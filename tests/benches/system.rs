@@ -18,7 +18,7 @@ use bus::Plane;
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::setup::Endpoint;
 use common::mission::Mission;
-use common::record::{ClockRecord, Row};
+use common::record::ClockRecord;
 use common::time::Time;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::state::CoordinationState;
@@ -350,9 +350,9 @@ fn wait_for<M: bincode::Decode<()>>(events: &Receiver<LineEvent>, mut is_it: imp
 /// One-way latency at 1000 messages per second, alternating between the plain router and the emulator.
 fn hop() {
     let (plain_heard, plain_times) = channel();
-    let plain = plain(move |_| drop(plain_heard.send(Instant::now())));
+    let plain = plain(move |_| plain_heard.send(Instant::now()).unwrap_or_default());
     let (emulated_heard, emulated_times) = channel();
-    let emulated = Emulated::new("", move |_, at| drop(emulated_heard.send(at)));
+    let emulated = Emulated::new("", move |_, at| emulated_heard.send(at).unwrap_or_default());
     let (mut of_plain, mut of_emulated) = (Vec::new(), Vec::new());
     let begun = Instant::now();
     for i in 0..6000u32 {
@@ -385,8 +385,12 @@ fn throughput() {
     let counter = || Arc::new(AtomicU64::new(0));
     let (of_plain, of_emulated) = (counter(), counter());
     let (p, e) = (of_plain.clone(), of_emulated.clone());
-    let plain = plain(move |_| drop(p.fetch_add(1, Ordering::Relaxed)));
-    let emulated = Emulated::new("queue = 1000000", move |_, _| drop(e.fetch_add(1, Ordering::Relaxed)));
+    let plain = plain(move |_| {
+        p.fetch_add(1, Ordering::Relaxed);
+    });
+    let emulated = Emulated::new("queue = 1000000", move |_, _| {
+        e.fetch_add(1, Ordering::Relaxed);
+    });
     let measure = |count: &AtomicU64, send: &dyn Fn()| {
         let before = count.load(Ordering::Relaxed);
         let begun = Instant::now();
@@ -398,7 +402,9 @@ fn throughput() {
     let (mut plain_rates, mut emulated_rates) = (Vec::new(), Vec::new());
     for _ in 0..3 {
         plain_rates.push(measure(&of_plain, &|| (plain.put)(&[7; 35])));
-        emulated_rates.push(measure(&of_emulated, &|| drop(emulated.send())));
+        emulated_rates.push(measure(&of_emulated, &|| {
+            emulated.send();
+        }));
         // What still waits belongs to neither.
         let mut last = u64::MAX;
         while last != of_emulated.load(Ordering::Relaxed) {
@@ -441,7 +447,6 @@ fn delay() {
             &format!("{:.0} / {:.0} / {:.0} µs", late[0], percentile(&late, 0.5), percentile(&late, 0.99)),
         );
     }
-    let _ = |row: Row| row;
 }
 
 /// Fifty vehicle processes in real time for a minute.

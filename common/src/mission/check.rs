@@ -483,14 +483,15 @@ fn check_vehicle(
     let start = Start { position: position.into(), yaw: start.yaw_deg.to_radians(), speed: start.speed_mps, xi };
     let plan = VehiclePlan { id: section.id.clone(), pattern: section.pattern, path, start, model, following };
     if let Err(reason) = build::craft(&plan, start, factor, fastest, law.map_or(DemandKind::Rate, |law| law.kind())) {
-        faults.fault(&format!("{key}.{}", following_key(section)), reason, "");
+        faults.fault(&following_key(&key, section), reason, "");
         return None;
     }
     Some(plan)
 }
 
-fn following_key(section: &VehicleSection) -> &'static str {
-    if section.following.is_some() { "following" } else { "id" }
+/// Where the following law of a vehicle is written.
+fn following_key(key: &str, section: &VehicleSection) -> String {
+    if section.following.is_some() { format!("{key}.following") } else { "fleet.following".to_string() }
 }
 
 fn path_name(path: &PathChoice) -> &'static str {
@@ -525,7 +526,7 @@ fn check_fit(
     };
     if !fits {
         let found = format!("{} with {}", following_name(following), model_name(model));
-        faults.fault(&format!("{key}.{}", following_key(section)), found, law_of_model);
+        faults.fault(&following_key(key, section), found, law_of_model);
         return false;
     }
     let mut ok = true;
@@ -668,8 +669,8 @@ mod tests {
             ("id = \"auv2\"", "id = \"AUV 2\"", "vehicles[1].id"),
             ("[\"auv2\", \"auv3\"]", "[\"auv2\", \"auv9\"]", "network.links[1]"),
             (", [\"auv2\", \"auv3\"]", "", "network.links"),
-            ("kind = \"II\"", "delta1_mps = 0.3", "vehicles[0]"),
-            ("{ underactuated_auv = \"sirene\" }", "\"kinematic_unicycle\"", "vehicles[0]"),
+            ("kind = \"II\"", "delta1_mps = 0.3", "fleet.following"),
+            ("{ underactuated_auv = \"sirene\" }", "\"kinematic_unicycle\"", "fleet.following"),
             ("delayed_with_losses = { gain = 0.1, delay_s = 5.0 }", "solution1 = { a = 1.0 }", "coordination.law"),
             ("speed = 0.5", "", "formation"),
             ("start = { x_m = 5.0, y_m = -10.0, z_m = -5.0 }", "", "vehicles[0]"),

@@ -168,7 +168,7 @@ pub struct NetworkSection {
     /// Links in both directions: pairs of vehicle ids.
     #[serde(default)]
     pub links: Vec<[String; 2]>,
-    /// Links in one direction: (from, to).
+    /// Links in one direction: from and to.
     #[serde(default)]
     pub one_way: Vec<[String; 2]>,
     /// Delay of every message.
@@ -292,7 +292,7 @@ pub struct UpInterval {
     pub from_s: f64,
     /// End (s).
     pub to_s: f64,
-    /// Directed links (from, to); all of them if absent.
+    /// Directed links from and to; all of them if absent.
     pub links: Option<Vec<[String; 2]>>,
 }
 
@@ -448,7 +448,7 @@ pub struct Theorem47 {
     pub kind: FollowingType,
     /// Position gain k_e (t/s).
     pub k_e: f64,
-    /// Velocity gain k_φ (t⁻¹ s⁻¹ in t, m, s, kN).
+    /// Velocity gain k_φ (t/s).
     pub k_phi: f64,
     /// Turn-rate gain k_z (t m²/s).
     pub k_z: f64,

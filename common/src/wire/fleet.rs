@@ -108,6 +108,8 @@ pub struct FleetStatus {
     pub speed: f64,
     /// Vehicles of the mission, and others that are connected.
     pub vehicles: Vec<VehicleStatus>,
+    /// Whether the logs of a flight that is over have been collected.
+    pub collected: bool,
     /// Messages taken, delivered, dropped and in flight, over all links.
     pub messages: [u64; 4],
 }
