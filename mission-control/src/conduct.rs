@@ -321,3 +321,140 @@ impl Machine for Conduct {
         (self.step != Step::Ended).then_some(self.next_poll)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use common::wire::fleet::VehicleStatus;
+
+    use super::*;
+
+    const HELIX: &str = include_str!("../../missions/auv-helix.toml");
+
+    fn conduct(collects: bool) -> Conduct {
+        let mission = Mission::parse("m.toml", HELIX).unwrap_or_else(|faults| panic!("{faults}"));
+        Conduct::new(Arc::new(mission), Pace::Stepped, Some(Span::from_secs(60.0)), collects)
+    }
+
+    fn status(phase: Phase, mission: &str, vehicles: Phase) -> FleetStatus {
+        let vehicle =
+            |id: &str| VehicleStatus { id: id.into(), connected: true, phase: vehicles, reason: String::new() };
+        FleetStatus {
+            phase,
+            mission: mission.into(),
+            now: Time::ZERO,
+            end: Time::from_secs(800.0),
+            speed: 0.5,
+            vehicles: ["auv1", "auv2", "auv3"].map(vehicle).into(),
+            collected: false,
+            messages: [0; 4],
+        }
+    }
+
+    /// What it says to the fleet, and how it ends, when the fleet says this.
+    fn hears(conduct: &mut Conduct, at_s: f64, message: FromFleet) -> Vec<ConductOutput> {
+        conduct.handle(Time::from_secs(at_s), Some(ConductInput::FromFleet(message)));
+        let all = std::iter::from_fn(|| conduct.poll_output());
+        all.filter(|output| !matches!(output, ConductOutput::Progress(..))).collect()
+    }
+
+    fn piece(file: u32, files: u32, offset: u64, size: u64, bytes: usize) -> LogPiece {
+        LogPiece { file, files, offset, size, bytes: vec![0; bytes] }
+    }
+
+    #[test]
+    fn upload_arm_start_fly_end() {
+        let mut conduct = conduct(false);
+        let said = hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+        assert!(matches!(&said[..], [ConductOutput::Send(ToFleet::Upload { .. })]), "{said:?}");
+        let said = hears(&mut conduct, 0.1, FromFleet::Status(status(Phase::Armed, HELIX, Phase::Idle)));
+        assert_eq!(said, vec![], "not all are armed");
+        let said = hears(&mut conduct, 0.2, FromFleet::Status(status(Phase::Armed, HELIX, Phase::Armed)));
+        assert_eq!(said, vec![ConductOutput::Send(ToFleet::Start { pace: Pace::Stepped })]);
+        hears(&mut conduct, 0.3, FromFleet::Status(status(Phase::Running, HELIX, Phase::Running)));
+        let said = hears(&mut conduct, 9.0, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Running)));
+        assert_eq!(said, vec![], "a vehicle still flies");
+        let said = hears(&mut conduct, 9.2, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Finished)));
+        assert_eq!(said[0], ConductOutput::Over(Phase::Finished));
+        assert_eq!(said[1], ConductOutput::Send(ToFleet::Dismiss));
+        assert!(matches!(said[2], ConductOutput::Done { phase: Phase::Finished, .. }));
+        assert_eq!(conduct.poll_timeout(), None);
+    }
+
+    #[test]
+    fn a_refusal_ends_it_with_the_reason() {
+        let mut conduct = conduct(false);
+        hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+        let mut refusing = status(Phase::Armed, HELIX, Phase::Idle);
+        refusing.vehicles[1].reason = "no such path".into();
+        let said = hears(&mut conduct, 0.1, FromFleet::Status(refusing));
+        assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv2") && r.contains("no such path")));
+    }
+
+    #[test]
+    fn who_is_missing_is_named_when_patience_ends() {
+        let mut conduct = conduct(false);
+        hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+        let mut waiting = status(Phase::Armed, HELIX, Phase::Armed);
+        waiting.vehicles[2].connected = false;
+        let said = hears(&mut conduct, 61.0, FromFleet::Status(waiting));
+        assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)")), "{said:?}");
+    }
+
+    #[test]
+    fn a_flight_under_way_is_joined_and_another_is_left_alone() {
+        let mut joined = conduct(true);
+        assert_eq!(hears(&mut joined, 0.0, FromFleet::Status(status(Phase::Running, HELIX, Phase::Running))), vec![]);
+        assert_eq!(joined.step, Step::Flying);
+        let mut other = conduct(true);
+        let said = hears(&mut other, 0.0, FromFleet::Status(status(Phase::Running, "other", Phase::Running)));
+        assert!(matches!(&said[..], [ConductOutput::Failed(_)]));
+    }
+
+    #[test]
+    fn a_flight_that_ended_unseen_is_collected_and_a_collected_one_is_flown_again() {
+        let mut unseen = conduct(true);
+        let said = hears(&mut unseen, 0.0, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Finished)));
+        assert_eq!(said[0], ConductOutput::Over(Phase::Finished));
+        let mut again = conduct(true);
+        let collected = FleetStatus { collected: true, ..status(Phase::Finished, HELIX, Phase::Finished) };
+        let said = hears(&mut again, 0.0, FromFleet::Status(collected));
+        assert!(matches!(&said[..], [ConductOutput::Send(ToFleet::Upload { .. })]), "{said:?}");
+    }
+
+    #[test]
+    fn logs_are_collected_piece_by_piece_and_asked_for_again() {
+        let mut conduct = conduct(true);
+        hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Finished)));
+        let log = |who: &str, piece| FromFleet::Log { who: who.into(), piece };
+        // The hub has one file in two pieces.
+        let said = hears(&mut conduct, 0.1, log(HUB, piece(0, 1, 0, 10, 6)));
+        assert!(matches!(
+            &said[..],
+            [ConductOutput::Log { .. }, ConductOutput::Send(ToFleet::SendLog { offset: 6, .. })]
+        ));
+        assert_eq!(hears(&mut conduct, 0.2, log(HUB, piece(0, 1, 0, 10, 6))), vec![], "the same piece twice");
+        conduct.handle(Time::from_secs(4.0), None);
+        assert!(
+            matches!(conduct.poll_output(), Some(ConductOutput::Send(ToFleet::SendLog { offset: 6, .. }))),
+            "again"
+        );
+        let said = hears(&mut conduct, 4.1, log(HUB, piece(0, 1, 6, 10, 4)));
+        assert!(matches!(&said[1], ConductOutput::Send(ToFleet::SendLog { who, .. }) if who == "auv1"), "{said:?}");
+        // auv1 has two files, auv2 none, auv3 does not answer.
+        hears(&mut conduct, 4.2, log("auv1", piece(0, 2, 0, 3, 3)));
+        let said = hears(&mut conduct, 4.3, log("auv1", piece(1, 2, 0, 3, 3)));
+        assert!(matches!(&said[1], ConductOutput::Send(ToFleet::SendLog { who, .. }) if who == "auv2"), "{said:?}");
+        hears(&mut conduct, 4.4, log("auv2", piece(0, 0, 0, 0, 0)));
+        let mut at = 4.4;
+        let missing = loop {
+            at += 3.5;
+            assert!(at < 60.0, "it gives up");
+            conduct.handle(Time::from_secs(at), None);
+            let outputs: Vec<_> = std::iter::from_fn(|| conduct.poll_output()).collect();
+            if let Some(ConductOutput::Done { missing, .. }) = outputs.last() {
+                break missing.clone();
+            }
+        };
+        assert_eq!(missing.iter().map(|(who, _)| who.as_str()).collect::<Vec<_>>(), ["auv2", "auv3"]);
+    }
+}

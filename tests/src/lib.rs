@@ -38,24 +38,32 @@ pub fn program(name: &str) -> PathBuf {
     path
 }
 
-/// Why a program must not be tested: it is not there, or its sources are newer.
+/// Why a program must not be tested: it is not there, or one of the sources that it is made from is newer.
 fn stale(program: &Path) -> Option<String> {
-    let made = |path: &Path| fs::metadata(path).and_then(|m| m.modified());
-    let Ok(built) = made(program) else { return Some(format!("there is no {}", program.display())) };
-    let list = program.with_extension("d");
-    let Ok(text) = fs::read_to_string(&list) else { return Some(format!("there is no {}", list.display())) };
-    sources(&text).into_iter().find_map(|source| match made(&source) {
-        Ok(changed) if changed <= built => None,
-        Ok(_) => Some(format!("{} is older than {}", program.display(), source.display())),
-        Err(_) => Some(format!("{} was made from {}, which is gone", program.display(), source.display())),
-    })
+    let Some(built) = changed(program) else { return Some(format!("there is no {}", program.display())) };
+    let crates = match program.file_name().and_then(|name| name.to_str()) {
+        Some("vehicle-node") => &["common", "bus", "vehicle-node"][..],
+        Some("network-emulator") => &["common", "bus", "network-emulator"],
+        _ => &["common", "bus", "vehicle-node", "network-emulator", "mission-control"],
+    };
+    let newest = crates.iter().filter_map(|name| newest_source(&in_repository(name).join("src"))).max()?;
+    (newest.0 > built).then(|| format!("{} is older than {}", program.display(), newest.1.display()))
 }
 
-/// The sources in a dep-info file of cargo: `target: source source ...`, with escaped spaces.
-fn sources(dep_info: &str) -> Vec<PathBuf> {
-    let Some((_, list)) = dep_info.lines().next().and_then(|line| line.split_once(": ")) else { return Vec::new() };
-    let whole = list.replace("\\ ", "\0");
-    whole.split_whitespace().map(|path| PathBuf::from(path.replace('\0', " "))).collect()
+fn changed(path: &Path) -> Option<SystemTime> {
+    fs::metadata(path).and_then(|m| m.modified()).ok()
+}
+
+/// The Rust source below a folder that was changed last, and when.
+fn newest_source(folder: &Path) -> Option<(SystemTime, PathBuf)> {
+    let entries = fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    entries
+        .filter_map(|path| match path.is_dir() {
+            true => newest_source(&path),
+            false if path.extension().is_some_and(|e| e == "rs") => Some((changed(&path)?, path)),
+            false => None,
+        })
+        .max()
 }
 
 /// A file of the repository, such as `missions/auv-helix.toml`.
@@ -419,30 +427,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sources_are_read_from_dep_info() {
-        let text = "/t/debug/a: /src/main.rs /with\\ space/lib.rs\n\n/t/debug/b: /other.rs\n";
-        assert_eq!(sources(text), [PathBuf::from("/src/main.rs"), PathBuf::from("/with space/lib.rs")]);
-        assert!(sources("").is_empty());
-    }
-
-    #[test]
     fn a_program_older_than_its_source_is_refused() {
         let ground = Ground::new();
-        let program = ground.file("program", "");
-        assert!(stale(&program).is_some_and(|fault| fault.contains("program.d")));
-        let source = ground.file("main.rs", "");
-        ground.file("program.d", &format!("{}: {}\n", program.display(), source.display()));
-        let set = |path: &Path, seconds| {
-            let file = File::options().write(true).open(path).expect("there");
-            file.set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)).expect("the time can be set");
-        };
-        set(&source, 1_000);
-        set(&program, 2_000);
-        assert_eq!(stale(&program), None);
-        set(&source, 3_000);
+        let program = ground.file("vehicle-node", "");
+        assert_eq!(stale(&program), None, "made just now");
+        let file = File::options().write(true).open(&program).expect("there");
+        file.set_modified(SystemTime::UNIX_EPOCH).expect("the time can be set");
         assert!(stale(&program).is_some_and(|fault| fault.contains("older than")));
-        fs::remove_file(&source).expect("there");
-        assert!(stale(&program).is_some_and(|fault| fault.contains("gone")));
         assert!(stale(Path::new("/nowhere")).is_some_and(|fault| fault.contains("there is no")));
     }
 
