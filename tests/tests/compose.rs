@@ -135,7 +135,7 @@ impl World {
         };
         assert_eq!(json("summary.json")["complete"], true);
         assert_eq!(json("host.json")["missing"], serde_json::json!([]), "every log was collected");
-        let recording = bus::recording::read(&run.join("recording.mcap")).expect("recording.mcap");
+        let recording = bus::recording::read(run.join("recording.mcap")).expect("recording.mcap");
         assert!(recording.complete && recording.damage.is_none());
         assert_eq!(
             recording.mission_toml,
