@@ -16,7 +16,7 @@ use common::wire::vehicle::LogPiece;
 use crate::recording::{FLUSH_PERIOD, Origin, Recorder, RowReader};
 
 /// Rows that wait for the disk; beyond it the process waits too.
-const QUEUE: usize = 1 << 16;
+const QUEUE: usize = 1 << 13;
 /// Bytes of a log sent at a time.
 const PIECE: usize = 512 << 10;
 

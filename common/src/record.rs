@@ -3,15 +3,20 @@
 //! Rows of [`Record`] are determined by the mission and its seed. What depends on the wall clock (achieved delays,
 //! missed deadlines) is in [`ClockRecord`], on topics of its own, so that equality of recordings means equality.
 
+use std::sync::Arc;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// A vehicle's name in a row; shared, because thousands of rows carry the same few.
+pub type Name = Arc<str>;
 
 /// State of one vehicle at one control instant. Angles in radians, lengths in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[allow(missing_docs, reason = "the names are the documentation: they are the columns of vehicles.csv")]
 pub struct StateRow {
     pub t_ns: i64,
-    pub vehicle: String,
+    pub vehicle: Name,
     pub xi: f64,
     pub xi_rate: f64,
     pub v_ref: f64,
@@ -52,8 +57,8 @@ pub enum Fate {
 pub struct MessageRow {
     /// When the fate was decided.
     pub t_ns: i64,
-    pub from: String,
-    pub to: String,
+    pub from: Name,
+    pub to: Name,
     /// Number of the message on its link, from 0.
     pub seq: u64,
     /// When the emulator took it.
@@ -68,8 +73,8 @@ pub struct MessageRow {
 #[allow(missing_docs, reason = "the names are the columns of topology.csv")]
 pub struct TopologyRow {
     pub t_ns: i64,
-    pub from: String,
-    pub to: String,
+    pub from: Name,
+    pub to: Name,
     pub up: bool,
 }
 
@@ -109,8 +114,8 @@ impl Record {
 #[allow(missing_docs, reason = "plain")]
 pub struct AchievedRow {
     pub t_ns: i64,
-    pub from: String,
-    pub to: String,
+    pub from: Name,
+    pub to: Name,
     pub seq: u64,
     /// Commanded delay \[ns of mission time\].
     pub commanded_ns: i64,
@@ -123,7 +128,7 @@ pub struct AchievedRow {
 #[allow(missing_docs, reason = "plain")]
 pub struct TicksRow {
     pub t_ns: i64,
-    pub vehicle: String,
+    pub vehicle: Name,
     pub met: u64,
     pub missed: u64,
     /// Largest lateness of a met deadline \[ns of wall clock\].

@@ -11,7 +11,7 @@ use common::graph::switching::Switching;
 use common::machine::Machine;
 use common::mission::{Delay, Mission};
 use common::random::Stream;
-use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, NoteRow, Record, Row, TopologyRow};
+use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, Name, NoteRow, Record, Row, TopologyRow};
 use common::time::{Span, Time};
 use common::wire::state::CoordinationState;
 use common::wire::{Garbage, GarbageCount};
@@ -46,6 +46,8 @@ pub enum Channel {
 /// The emulated network of one mission.
 pub struct Emulator {
     mission: Arc<Mission>,
+    /// The vehicles' names, for the rows.
+    names: Vec<Name>,
     links: Vec<Wire>,
     /// Indices into `links`, by sender.
     out: Vec<Vec<usize>>,
@@ -121,6 +123,7 @@ impl Emulator {
         }
         let switching = mission.switching.clone();
         let mut emulator = Emulator {
+            names: mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect(),
             up: vec![false; links.len()],
             garbage: vec![GarbageCount::default(); mission.vehicles.len()],
             links,
@@ -147,6 +150,11 @@ impl Emulator {
     /// The ledger of each directed link, in the order of the mission's links.
     pub fn ledgers(&self) -> impl Iterator<Item = &Ledger> {
         self.links.iter().map(|link| &link.ledger)
+    }
+
+    /// The name of a vehicle.
+    pub fn name(&self, vehicle: usize) -> &Name {
+        &self.names[vehicle]
     }
 
     /// Sent, delivered, dropped, in flight, over all links.
@@ -232,8 +240,8 @@ impl Emulator {
         let link = &self.links[message.link];
         let row = MessageRow {
             t_ns: t.nanos(),
-            from: self.mission.vehicles[link.from].id.clone(),
-            to: self.mission.vehicles[link.to].id.clone(),
+            from: self.names[link.from].clone(),
+            to: self.names[link.to].clone(),
             seq: message.number,
             sent_ns: message.sent.nanos(),
             due_ns: message.due.nanos(),
@@ -254,8 +262,8 @@ impl Emulator {
         if let Some(speed_up) = self.watch_delays {
             let row = AchievedRow {
                 t_ns: message.due.nanos(),
-                from: self.mission.vehicles[link.from].id.clone(),
-                to: self.mission.vehicles[link.to].id.clone(),
+                from: self.names[link.from].clone(),
+                to: self.names[link.to].clone(),
                 seq: message.number,
                 commanded_ns: (message.due - message.sent).nanos(),
                 late_ns: ((now - message.due).nanos() as f64 / speed_up) as i64,
@@ -273,8 +281,8 @@ impl Emulator {
             if record && (first || up != self.up[index]) {
                 let row = TopologyRow {
                     t_ns: t.nanos(),
-                    from: self.mission.vehicles[self.links[index].from].id.clone(),
-                    to: self.mission.vehicles[self.links[index].to].id.clone(),
+                    from: self.names[self.links[index].from].clone(),
+                    to: self.names[self.links[index].to].clone(),
                     up,
                 };
                 self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));

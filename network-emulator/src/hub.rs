@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use common::machine::Machine;
 use common::mission::{Mission, digest};
-use common::record::{ClockRecord, NoteRow, Record, Row, SpeedRow};
+use common::record::{ClockRecord, Name, NoteRow, Record, Row, SpeedRow};
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
@@ -37,7 +37,7 @@ pub enum HubInput {
     /// A vehicle said something on the mission plane.
     FromVehicle(String, FromVehicle),
     /// A vehicle put bytes on the air.
-    State(String, Vec<u8>),
+    State(Name, Vec<u8>),
     /// Mission-control, or an operator at another terminal, said something.
     FromControl {
         /// Who: the answer goes there.
@@ -59,7 +59,7 @@ pub enum HubOutput {
     /// Say this to a vehicle on the mission plane.
     ToVehicle(String, ToVehicle),
     /// Hand these bytes to a vehicle on the coordination plane.
-    Deliver(String, Arc<[u8]>),
+    Deliver(Name, Arc<[u8]>),
     /// Say this to mission-control, or to an operator.
     ToControl {
         /// To whom.
@@ -628,7 +628,7 @@ impl Hub {
                 Channel::Deliver { to, due, bytes } => match &mut load.lockstep {
                     Some(lockstep) => lockstep.heard[to].0.push((due, bytes.to_vec())),
                     None => {
-                        let id = load.mission.vehicles[to].id.clone();
+                        let id = load.emulator.name(to).clone();
                         self.outputs.push_back(HubOutput::Deliver(id, bytes));
                     }
                 },

@@ -1,6 +1,6 @@
 //! The emulator as a program: what it does for its machine. The only file of this crate that knows there is a network.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,6 +13,7 @@ use bus::logs::Logs;
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use clap::Parser;
+use common::record::Name;
 use common::wire::fleet::{Pace, ToFleet};
 use common::wire::vehicle::{ClockPlan, FromVehicle, Phase};
 use common::wire::{self, Garbage, GarbageCount};
@@ -59,7 +60,7 @@ pub fn run(args: Args) -> ExitCode {
     let mut port = HubPort {
         switchboard,
         logs: Logs::new(&args.logs, HUB),
-        lines: BTreeMap::new(),
+        lines: HashMap::new(),
         ids: BTreeMap::new(),
         garbage: BTreeMap::new(),
         stop,
@@ -76,8 +77,8 @@ pub fn run(args: Args) -> ExitCode {
 struct HubPort {
     switchboard: Switchboard,
     logs: Logs,
-    lines: BTreeMap<String, LineId>,
-    ids: BTreeMap<LineId, String>,
+    lines: HashMap<Name, LineId>,
+    ids: BTreeMap<LineId, Name>,
     /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
@@ -102,7 +103,7 @@ impl HubPort {
 
     fn ignore(&mut self, line: LineId, kind: Garbage) {
         if self.garbage.entry(line).or_default().count(kind) {
-            let id = self.ids.get(&line).map_or("?", String::as_str);
+            let id = self.ids.get(&line).map_or("?", |id| &**id);
             tracing::warn!("ignored a message of {id} on the mission plane: {}", kind.as_str());
         }
     }
@@ -120,8 +121,9 @@ impl Port for HubPort {
     fn translate(&mut self, event: HubEvent) -> Option<(Option<Instant>, HubInput)> {
         match event {
             HubEvent::Joined { line, id } => {
-                self.lines.insert(id.clone(), line);
-                self.ids.insert(line, id.clone());
+                let name = Name::from(id.as_str());
+                self.lines.insert(name.clone(), line);
+                self.ids.insert(line, name);
                 if is_control(&id) {
                     return None;
                 }
@@ -134,7 +136,7 @@ impl Port for HubPort {
                     return None;
                 }
                 tracing::warn!("{id} left");
-                Some((None, HubInput::Left(id)))
+                Some((None, HubInput::Left(id.to_string())))
             }
             HubEvent::Packet { line, plane: Plane::State, at, bytes } => {
                 let id = self.ids.get(&line)?.clone();
@@ -143,9 +145,10 @@ impl Port for HubPort {
             HubEvent::Packet { line, plane: Plane::Mission, bytes, .. } => {
                 let id = self.ids.get(&line)?.clone();
                 let input = if is_control(&id) {
-                    wire::decode::<ToFleet>(&bytes).map(|message| HubInput::FromControl { who: id, message })
+                    wire::decode::<ToFleet>(&bytes)
+                        .map(|message| HubInput::FromControl { who: id.to_string(), message })
                 } else {
-                    wire::decode::<FromVehicle>(&bytes).map(|message| HubInput::FromVehicle(id, message))
+                    wire::decode::<FromVehicle>(&bytes).map(|message| HubInput::FromVehicle(id.to_string(), message))
                 };
                 match input {
                     Ok(input) => Some((None, input)),

@@ -360,7 +360,7 @@ pub fn states<'r>(exact: &'r [Record], id: &str) -> Vec<&'r StateRow> {
     let mut rows: Vec<&StateRow> = exact
         .iter()
         .filter_map(|record| match record {
-            Record::State(row) if row.vehicle == id => Some(row),
+            Record::State(row) if *row.vehicle == *id => Some(row),
             _ => None,
         })
         .collect();

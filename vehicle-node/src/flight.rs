@@ -6,7 +6,7 @@ use std::sync::Arc;
 use common::craft::Craft;
 use common::machine::Machine;
 use common::mission::{Mission, SpeedProfile, Start};
-use common::record::{ClockRecord, NoteRow, Record, Row, StateRow, TicksRow};
+use common::record::{ClockRecord, Name, NoteRow, Record, Row, StateRow, TicksRow};
 use common::time::Time;
 use common::wire::Garbage;
 use common::wire::state::CoordinationState;
@@ -43,6 +43,7 @@ const TICKS_PER_REPORT: u64 = 200;
 pub struct Flight {
     mission: Arc<Mission>,
     me: usize,
+    name: Name,
     craft: Box<dyn Craft>,
     neighbours: Neighbours,
     speed: SpeedProfile,
@@ -105,6 +106,7 @@ impl Flight {
     ) -> Result<Flight, String> {
         let period = mission.control_period.nanos();
         Ok(Flight {
+            name: mission.vehicles[me].id.as_str().into(),
             craft: mission.craft(me, start)?,
             neighbours: Neighbours::new(&mission, me),
             speed: mission.speed.clone(),
@@ -234,7 +236,7 @@ impl Flight {
         let o = self.craft.observe();
         StateRow {
             t_ns: t.nanos(),
-            vehicle: self.mission.vehicles[self.me].id.clone(),
+            vehicle: self.name.clone(),
             xi: o.xi,
             xi_rate: o.xi_rate,
             v_ref: o.v_ref,
@@ -269,7 +271,7 @@ impl Flight {
         if let Some(deadlines) = self.deadlines.replace(Deadlines::default()) {
             let row = TicksRow {
                 t_ns: now.nanos(),
-                vehicle: self.mission.vehicles[self.me].id.clone(),
+                vehicle: self.name.clone(),
                 met: deadlines.met,
                 missed: deadlines.missed,
                 worst_late_ns: deadlines.worst_late_ns,

@@ -110,7 +110,7 @@ impl Topic {
 /// The topic on which a row is recorded.
 pub fn topic_of(row: &Row) -> Cow<'static, str> {
     let vehicle = match row {
-        Row::Exact(Record::State(state)) => state.vehicle.as_str(),
+        Row::Exact(Record::State(state)) => &*state.vehicle,
         _ => "",
     };
     Topic::of(row).name(vehicle)

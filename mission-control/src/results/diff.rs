@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn a_missing_row_is_named_with_its_side() {
         let (left, mut right) = (fleet(true), fleet(true));
-        right.exact.retain(|record| !matches!(record, Record::Message(row) if row.seq == 3 && row.from == "v3"));
+        right.exact.retain(|record| !matches!(record, Record::Message(row) if row.seq == 3 && *row.from == *"v3"));
         assert_eq!(
             diff(&left, &right).to_string(),
             "differ at 6.5 s in /network/messages: message 3 v3 → v2 is missing from the second run"

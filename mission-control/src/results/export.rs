@@ -154,8 +154,8 @@ mod tests {
         let (from, to) = (String::from("a"), String::from("b,c"));
         let message = MessageRow {
             t_ns: 1_250_000_001,
-            from: from.clone(),
-            to: to.clone(),
+            from: from.as_str().into(),
+            to: to.as_str().into(),
             seq: 3,
             sent_ns: 1_000_000_000,
             due_ns: -1,
@@ -164,7 +164,7 @@ mod tests {
         let [vehicles, links, topology] = exported(&[
             Record::State(state_row(50_000_000, "v1", 0.1 + 0.2)),
             Record::Message(message),
-            Record::Topology(TopologyRow { t_ns: 0, from, to, up: false }),
+            Record::Topology(TopologyRow { t_ns: 0, from: from.into(), to: to.into(), up: false }),
         ]);
         assert_eq!(
             vehicles,

@@ -129,7 +129,7 @@ pub(super) fn transmissions(exact: &[Record]) -> u64 {
     let mut sent: Vec<(&str, i64, u64)> = exact
         .iter()
         .filter_map(|record| match record {
-            Record::Message(row) => Some((row.from.as_str(), row.sent_ns, row.seq)),
+            Record::Message(row) => Some((&*row.from, row.sent_ns, row.seq)),
             _ => None,
         })
         .collect();
@@ -173,7 +173,7 @@ impl Network {
         for record in exact {
             if let Record::Topology(row) = record {
                 let at = (row.t_ns as f64 / 1e9).clamp(0.0, facts.duration_s);
-                changes.entry((row.from.clone(), row.to.clone())).or_default().push((at, row.up));
+                changes.entry((row.from.to_string(), row.to.to_string())).or_default().push((at, row.up));
             }
         }
         changes.values_mut().for_each(|changes| changes.sort_by(|a, b| a.0.total_cmp(&b.0)));

@@ -28,8 +28,8 @@ pub fn tracks<'a>(exact: &'a [Record], facts: &'a Facts) -> Vec<Track<'a>> {
         let Record::State(row) = record else { continue };
         // Vehicles report in turn: the next one is most often the right one.
         let found = match tracks.get(guess) {
-            Some(track) if track.id == row.vehicle => Some(guess),
-            _ => tracks.iter().position(|track| track.id == row.vehicle),
+            Some(track) if track.id == &*row.vehicle => Some(guess),
+            _ => tracks.iter().position(|track| track.id == &*row.vehicle),
         };
         if let Some(index) = found {
             tracks[index].rows.push(row);

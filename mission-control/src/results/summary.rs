@@ -268,14 +268,14 @@ pub fn summarise_clock(recording: &Recording) -> ClockSummary {
             }
             ClockRecord::Ticks(row) => {
                 let worst_late_s = row.worst_late_ns as f64 / 1e9;
-                match summary.deadlines.iter_mut().find(|deadlines| deadlines.vehicle == row.vehicle) {
+                match summary.deadlines.iter_mut().find(|deadlines| *deadlines.vehicle == *row.vehicle) {
                     Some(deadlines) => {
                         deadlines.met += row.met;
                         deadlines.missed += row.missed;
                         deadlines.worst_late_s = deadlines.worst_late_s.max(worst_late_s);
                     }
                     None => summary.deadlines.push(DeadlineSummary {
-                        vehicle: row.vehicle.clone(),
+                        vehicle: row.vehicle.to_string(),
                         met: row.met,
                         missed: row.missed,
                         worst_late_s,
@@ -478,7 +478,7 @@ mod tests {
         assert_eq!(summary.warnings.len(), 4, "{:?}", summary.warnings);
         assert!(serde_json::to_string(&summary).expect("serialises").contains("\"steady_speed\":0.0"));
         let mut lacking = fleet(true);
-        lacking.exact.retain(|record| !matches!(record, Record::Message(row) if row.seq == 7 && row.to == "v2"));
+        lacking.exact.retain(|record| !matches!(record, Record::Message(row) if row.seq == 7 && *row.to == *"v2"));
         let summary = summarise(&lacking, &facts(true));
         assert!(!summary.fleet.messages.balanced);
         assert_eq!(summary.warnings.len(), 2, "{:?}", summary.warnings);

@@ -127,7 +127,7 @@ pub(super) fn fleet(spatial: bool) -> Recording {
         ClockRecord::Achieved(AchievedRow { t_ns: 0, from, to, seq, commanded_ns: 5_000_000_000, late_ns })
     });
     let ticks = (1..=3).map(|index| {
-        let vehicle = format!("v{index}");
+        let vehicle = format!("v{index}").into();
         ClockRecord::Ticks(TicksRow { t_ns: 0, vehicle, met: 4000 - index, missed: index, worst_late_ns: 3_100_000 })
     });
     let text = "rejoined at <ξ = 12.5> after 3.2 s".into();
