@@ -1,9 +1,11 @@
 //! What a program says to the person at its terminal, and what that person can say to it with a signal.
 
-use std::io::IsTerminal;
+use std::fmt;
+use std::io::{IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use tracing_subscriber::EnvFilter;
 
 /// Log lines go to stderr, `info` and above (`RUST_LOG` changes that), with colour on a terminal only.
@@ -14,7 +16,35 @@ pub fn init_log() {
         .with_target(false)
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(std::io::stderr)
+        .log_internal_errors(false)
         .try_init();
+}
+
+/// Writes to stdout. That nobody reads it (a closed pipe, a full disk) is no reason to fall over.
+pub fn write_out(text: fmt::Arguments<'_>) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_fmt(text).and_then(|()| out.flush());
+}
+
+/// Writes to stderr, likewise.
+pub fn write_err(text: fmt::Arguments<'_>) {
+    let _ = std::io::stderr().lock().write_fmt(text);
+}
+
+/// A line for whoever asked: `println!` that survives a closed pipe.
+#[macro_export]
+macro_rules! tell {
+    ($($text:tt)*) => {
+        $crate::console::write_out(format_args!("{}\n", format_args!($($text)*)))
+    };
+}
+
+/// A line for the person at the terminal: `eprintln!` that survives a closed pipe.
+#[macro_export]
+macro_rules! remark {
+    ($($text:tt)*) => {
+        $crate::console::write_err(format_args!("{}\n", format_args!($($text)*)))
+    };
 }
 
 /// Whether the process was asked to end.
@@ -22,11 +52,11 @@ pub fn init_log() {
 pub struct StopFlag(Arc<AtomicBool>);
 
 impl StopFlag {
-    /// A flag for SIGINT and SIGTERM, which end the process at once until [`arm`](StopFlag::arm) is called. (The first
+    /// A flag for SIGINT, SIGTERM and SIGHUP, which end the process at once until [`arm`](StopFlag::arm) is called. (The first
     /// process of a container has no default for them.)
     pub fn on_signals() -> StopFlag {
         let flag = StopFlag(Arc::new(AtomicBool::new(true)));
-        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        for signal in [SIGINT, SIGTERM, SIGHUP] {
             // In this order: the second signal finds the flag raised by the first.
             let exit = signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&flag.0));
             if let Err(error) = exit.and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag.0))) {

@@ -122,6 +122,16 @@ impl Rest {
     /// Ten minutes.
     const LIMIT: Duration = Duration::from_secs(600);
 
+    /// How long it has lasted.
+    pub fn lasted(&self) -> Duration {
+        self.0.elapsed()
+    }
+
+    /// Lets time pass before the next attempt at something that only time can change.
+    pub fn pause(length: Duration) {
+        std::thread::sleep(length);
+    }
+
     /// Whether the rest has lasted too long; flying begins it anew.
     pub fn is_over(&mut self, flying: bool) -> bool {
         if flying {

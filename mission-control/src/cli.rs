@@ -157,6 +157,9 @@ enum Format {
     Csv,
 }
 
+/// Longest mission file (bytes).
+const MISSION_BYTES: u64 = 1 << 20;
+
 /// How long a single command waits for the fleet to appear.
 const COMMAND_PATIENCE: Duration = Duration::from_secs(3);
 
@@ -170,7 +173,7 @@ pub fn main(cli: Cli) -> ExitCode {
     match run(cli.command) {
         Ok(code) => code,
         Err(End(code, reason)) => {
-            eprintln!("{reason}");
+            bus::remark!("{reason}");
             ExitCode::from(code)
         }
     }
@@ -189,7 +192,7 @@ fn run(what: What) -> Ended {
         What::Diff { a, b } => compare(&a, &b),
         What::Recover { recording, out } => recover(&recording, out),
         What::Schema => {
-            println!("{:#}", common::mission::schema());
+            bus::tell!("{:#}", common::mission::schema());
             Ok(ExitCode::SUCCESS)
         }
         What::VehicleNode(args) => Ok(vehicle_node::program::run(args)),
@@ -198,8 +201,15 @@ fn run(what: What) -> Ended {
 }
 
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| End(2, format!("cannot read the mission file {}: {error}", path.display())))?;
+    let unreadable =
+        |error: std::io::Error| End(2, format!("cannot read the mission file {}: {error}", path.display()));
+    let mut text = String::new();
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    std::io::Read::read_to_string(&mut std::io::Read::take(file, MISSION_BYTES + 1), &mut text).map_err(unreadable)?;
+    if text.len() as u64 > MISSION_BYTES {
+        let reason = format!("the mission file {} is too long; allowed: {MISSION_BYTES} bytes", path.display());
+        return Err(End(2, reason));
+    }
     Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
         let n = faults.list.len();
         End(
@@ -218,9 +228,9 @@ fn check(path: &Path, json: bool) -> Ended {
             .map(|row| serde_json::json!({"name": row.name, "condition": row.condition, "holds": row.holds, "predicted": row.predicted}))
             .collect();
         let digest = format!("{:016x}", mission.digest);
-        println!("{:#}", serde_json::json!({"mission": mission.name, "digest": digest, "theory": rows}));
+        bus::tell!("{:#}", serde_json::json!({"mission": mission.name, "digest": digest, "theory": rows}));
     } else {
-        println!(
+        bus::tell!(
             "{}: {} vehicles, {} directed links, {}",
             mission.name,
             mission.vehicles.len(),
@@ -236,7 +246,7 @@ fn check(path: &Path, json: bool) -> Ended {
 /// A mission that violates a condition flies, with a warning that names it.
 fn warn(rows: &[TheoryRow]) {
     for row in rows.iter().filter(|row| row.holds == Some(false)) {
-        eprintln!("warning: not covered by theory: {}: needs {}", row.name, row.condition);
+        bus::remark!("warning: not covered by theory: {}: needs {}", row.name, row.condition);
     }
 }
 
@@ -247,7 +257,7 @@ fn print_theory(rows: &[TheoryRow]) {
             Some(false) => "does not hold",
             None => "",
         };
-        println!(
+        bus::tell!(
             "  {}\n      needs {} {}\n      predicts {}",
             row.name,
             row.condition,
@@ -255,7 +265,7 @@ fn print_theory(rows: &[TheoryRow]) {
             row.predicted
         );
         if row.measured != "–" {
-            println!("      measured {}", row.measured);
+            bus::tell!("      measured {}", row.measured);
         }
     }
 }
@@ -288,7 +298,7 @@ fn run_fleet(args: RunArgs) -> Ended {
         Err(Failure::Refused(reason)) => Err(End(1, reason)),
         Err(Failure::Files(reason)) => Err(End(4, reason)),
         Err(Failure::Detached(reason)) => {
-            eprintln!("{reason}");
+            bus::remark!("{reason}");
             Ok(ExitCode::SUCCESS)
         }
     }
@@ -297,20 +307,25 @@ fn run_fleet(args: RunArgs) -> Ended {
 /// What came of a flight, for a person or a pipe.
 fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missing: &[String], json: bool) -> Ended {
     for text in missing {
-        eprintln!("warning: {text}");
+        bus::remark!("warning: {text}");
     }
     if json {
-        println!("{}", serde_json::to_string_pretty(summary).map_err(|error| End(4, error.to_string()))?);
+        bus::tell!("{}", serde_json::to_string_pretty(summary).map_err(|error| End(4, error.to_string()))?);
     } else {
-        println!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
+        bus::tell!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
         print_theory(&theory::rows(mission, Some(summary)));
         let m = &summary.fleet.messages;
-        println!(
+        bus::tell!(
             "  Messages: {} sent = {} delivered + {} lost + {} with the link down + {} with the queue full + {} in flight",
-            m.sent, m.delivered, m.lost, m.link_down, m.queue_full, m.in_flight
+            m.sent,
+            m.delivered,
+            m.lost,
+            m.link_down,
+            m.queue_full,
+            m.in_flight
         );
-        println!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
-        println!("report: {}", folder.join("report.html").display());
+        bus::tell!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
+        bus::tell!("report: {}", folder.join("report.html").display());
     }
     Ok(if phase == Phase::Finished { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
@@ -325,7 +340,7 @@ fn ask(endpoint: &Endpoint, question: &ToFleet) -> Result<FromFleet, End> {
 
 fn speed_command(speed: f64, endpoint: &Endpoint) -> Ended {
     if let FromFleet::SpeedTaken { at, speed } = ask(endpoint, &ToFleet::Speed { speed })? {
-        println!("formation speed {speed} from {at} on");
+        bus::tell!("formation speed {speed} from {at} on");
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -339,7 +354,7 @@ fn status(json: bool, endpoint: &Endpoint) -> Ended {
                 .map(|v| serde_json::json!({"id": v.id, "connected": v.connected, "phase": v.phase.as_str(), "reason": v.reason}))
                 .collect();
             let [sent, delivered, dropped, in_flight] = status.messages;
-            println!(
+            bus::tell!(
                 "{:#}",
                 serde_json::json!({
                     "phase": status.phase.as_str(), "now_s": status.now.secs(), "end_s": status.end.secs(),
@@ -348,7 +363,7 @@ fn status(json: bool, endpoint: &Endpoint) -> Ended {
                 })
             );
         } else {
-            print!("{}", operator::describe(&status));
+            bus::tell!("{}", operator::describe(&status).trim_end());
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -356,13 +371,13 @@ fn status(json: bool, endpoint: &Endpoint) -> Ended {
 
 fn stop(endpoint: &Endpoint) -> Ended {
     ask(endpoint, &ToFleet::Stop)?;
-    println!("stopped");
+    bus::tell!("stopped");
     Ok(ExitCode::SUCCESS)
 }
 
 fn report(run: &Path) -> Ended {
     folder::report(run, Vec::new()).map_err(|error| End(4, error))?;
-    println!("report: {}", run.join("report.html").display());
+    bus::tell!("report: {}", run.join("report.html").display());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -373,7 +388,7 @@ fn export(run: &Path, out: Option<PathBuf>) -> Ended {
     let failed = |error: std::io::Error| End(4, format!("cannot export to {}: {error}", out.display()));
     std::fs::create_dir_all(&out).map_err(failed)?;
     export_csv(&recording.exact, &out).map_err(failed)?;
-    println!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
+    bus::tell!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -381,8 +396,13 @@ fn compare(a: &Path, b: &Path) -> Ended {
     let left = folder::recording(a).map_err(|error| End(4, error))?;
     let right = folder::recording(b).map_err(|error| End(4, error))?;
     let outcome = diff(&left, &right);
-    println!("{outcome}");
-    Ok(if matches!(outcome, crate::results::Outcome::Equal { .. }) { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    let whole = left.complete && right.complete;
+    bus::tell!("{outcome}");
+    Ok(if whole && matches!(outcome, crate::results::Outcome::Equal { .. }) {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(1)
+    })
 }
 
 fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
@@ -391,6 +411,9 @@ fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
         path.with_file_name(format!("{stem}-recovered.mcap"))
     });
     let recovered = bus::recording::recover(path, &out).map_err(|error| End(4, error.to_string()))?;
-    println!("{} rows to {}", recovered.rows, out.display());
+    if recovered.rows == 0 {
+        return Err(End(4, format!("{} holds no row that could be saved", path.display())));
+    }
+    bus::tell!("{} rows to {}", recovered.rows, out.display());
     Ok(ExitCode::SUCCESS)
 }

@@ -40,7 +40,7 @@ impl Progress {
             }
             None => {
                 if self.last_step != step || self.last_line.elapsed() >= PLAIN_PERIOD {
-                    eprintln!("{step}: {:.0} of {:.0} s  {message}", now.secs().max(0.0), self.end.secs());
+                    bus::remark!("{step}: {:.0} of {:.0} s  {message}", now.secs().max(0.0), self.end.secs());
                     self.last_line = Instant::now();
                     self.last_step = step.to_string();
                 }
@@ -52,7 +52,7 @@ impl Progress {
     pub fn line(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None => eprintln!("{text}"),
+            None => bus::remark!("{text}"),
         }
     }
 

@@ -117,7 +117,14 @@ pub fn recording(run: &Path) -> Result<Recording, String> {
     if !path.exists() {
         return Err(format!("no recording at {}; give a run folder or an .mcap file", path.display()));
     }
-    read(&path).map_err(|error| error.to_string())
+    let recording = read(&path).map_err(|error| error.to_string())?;
+    if recording.mission_toml.is_empty() {
+        return Err(format!("{} is damaged or no recording of a flight: it names no mission", path.display()));
+    }
+    if !recording.complete {
+        bus::remark!("warning: {} is cut off or damaged; what is whole of it is used", path.display());
+    }
+    Ok(recording)
 }
 
 /// `2026-01-31-235959`, in UTC.

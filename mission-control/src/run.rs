@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
 use std::net::TcpListener;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -20,7 +21,8 @@ use common::time::Span;
 use common::wire::fleet::{FleetStatus, FromFleet, Pace};
 use common::wire::vehicle::{LogPiece, Phase};
 use common::wire::{self, GarbageCount};
-use network_emulator::hub::COLLECTOR;
+use network_emulator::hub::{COLLECTOR, HUB};
+use rustix::process::{Pid, Signal, kill_process};
 
 use crate::conduct::{Conduct, ConductInput, ConductOutput, Step};
 use crate::console::Progress;
@@ -82,6 +84,9 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     let begun = Instant::now();
     let own = plan.attach.is_none();
     let stop = StopFlag::on_signals();
+    if own {
+        stop.arm();
+    }
     let (endpoint, mut processes, folder) = match &plan.attach {
         Some(endpoint) => (endpoint.clone(), Processes::default(), None),
         None => {
@@ -113,7 +118,17 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     port.progress.done();
     let collected = port.collected.clone();
     port.line.close();
-    let (phase, missing) = exit?;
+    let (phase, missing) = match exit {
+        Ok(ending) => ending,
+        Err(failure) => {
+            processes.terminate();
+            processes.end();
+            return Err(failure);
+        }
+    };
+    if phase != Phase::Finished {
+        processes.terminate();
+    }
     let mut missing: Vec<String> = missing.into_iter().map(|(who, why)| format!("log of {who}: {why}")).collect();
     missing.extend(processes.end());
 
@@ -122,6 +137,10 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     } else {
         files_below(&collected)
     };
+    if logs.is_empty() {
+        let reason = format!("nothing was recorded: {}; see logs/ in {}", missing.join(", "), folder.display());
+        return Err(Failure::Unreachable(reason));
+    }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
     missing.extend(merged.incomplete.iter().map(|path| format!("{} ends in the middle", file_name(path))));
     if !own {
@@ -184,7 +203,7 @@ impl Processes {
             let last = said.lines().last().unwrap_or("it said nothing").to_string();
             Failure::Unreachable(format!("the network-emulator did not come up: {last}"))
         })?;
-        eprintln!("network-emulator listens on {endpoint}; another terminal can use --attach {endpoint}");
+        bus::remark!("network-emulator listens on {endpoint}; another terminal can use --attach {endpoint}");
         for vehicle in &mission.vehicles {
             let child = processes.spawn(&logs, &vehicle.id, &["--id", &vehicle.id, "--connect", &endpoint.to_string()]);
             match child {
@@ -207,6 +226,8 @@ impl Processes {
             .args(arguments)
             .arg("--once")
             .args([std::ffi::OsStr::new("--logs"), logs.as_os_str()])
+            // A group of its own: what the terminal signals reaches mission-control, which ends the flight in order.
+            .process_group(0)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(said)
@@ -226,6 +247,15 @@ impl Processes {
         });
         self.ended.extend(news.iter().cloned());
         news
+    }
+
+    /// Asks all to end now: each closes its log first.
+    fn terminate(&self) {
+        for child in self.running.values() {
+            if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
+                let _ = kill_process(pid, Signal::TERM);
+            }
+        }
     }
 
     /// Waits for all to end, makes those that do not, and tells of those that ended early.
@@ -361,9 +391,10 @@ impl Port for ConductPort<'_> {
             self.progress.line("stopping the flight; once more ends at once");
             return Next::Feed(ConductInput::Interrupt);
         }
-        if self.own && self.processes.running.is_empty() && !self.processes.ended.is_empty() {
-            let reason = "every process of the fleet has ended; see logs/ in the run folder".to_string();
-            return Next::Exit(Err(Failure::Unreachable(reason)));
+        if self.own && !self.processes.running.contains_key(HUB) {
+            // Nobody will start it again; what was recorded is worth a report.
+            self.progress.line("the network-emulator has ended, and the flight with it");
+            return Next::Exit(Ok((Phase::Aborted, Vec::new())));
         }
         Next::Go
     }

@@ -353,6 +353,9 @@ impl Hub {
         let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else {
             return self.refuse("no flight is under way, so there is no speed to change".into());
         };
+        if let Err(reason) = load.mission.fits_speed(speed) {
+            return self.refuse(format!("a formation speed of {speed} cannot be flown: {reason}"));
+        }
         let at = match (&load.lockstep, load.clock) {
             (Some(lockstep), _) => lockstep.next_free(),
             (None, Some(ClockPlan::Real { speed_up, .. })) => now + Span::from_secs(SPEED_LEAD_S * speed_up),

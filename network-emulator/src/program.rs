@@ -1,9 +1,9 @@
 //! The emulator as a program: what it does for its machine. The only file of this crate that knows there is a network.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use bus::Plane;
@@ -22,6 +22,9 @@ use crate::hub::{COLLECTOR, HUB, Hub, HubInput, HubOutput, OPERATOR};
 
 /// From the command to start until mission time zero: long enough for every vehicle to hear of it.
 const START_LEAD: Duration = Duration::from_millis(500);
+
+/// How long a port that is in use is waited for.
+const PORT_PATIENCE: Duration = Duration::from_secs(2);
 
 /// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
 ///
@@ -45,7 +48,7 @@ pub struct Args {
 
 /// Runs the program to its end.
 pub fn run(args: Args) -> ExitCode {
-    let (switchboard, events) = match Switchboard::open(SwitchboardConfig::new(args.listen)) {
+    let (switchboard, events) = match open(&args.listen) {
         Ok(open) => open,
         Err(error) => {
             tracing::error!("{error}");
@@ -54,8 +57,7 @@ pub fn run(args: Args) -> ExitCode {
     };
     let stop = StopFlag::on_signals();
     stop.arm();
-    println!("{}", switchboard.endpoint());
-    let _ = std::io::stdout().flush();
+    bus::tell!("{}", switchboard.endpoint());
     tracing::info!("network-emulator listens on {}", switchboard.endpoint());
     let mut port = HubPort {
         switchboard,
@@ -72,6 +74,17 @@ pub fn run(args: Args) -> ExitCode {
     port.logs.close();
     port.switchboard.close();
     exit
+}
+
+/// Opens the switchboard. A port in use may belong to a process that was killed a moment ago.
+fn open(listen: &Endpoint) -> bus::Result<(Switchboard, Receiver<HubEvent>)> {
+    let patience = Rest::default();
+    loop {
+        match Switchboard::open(SwitchboardConfig::new(listen.clone())) {
+            Err(bus::Error::PortInUse(_)) if patience.lasted() < PORT_PATIENCE => Rest::pause(PORT_PATIENCE / 20),
+            other => return other,
+        }
+    }
 }
 
 struct HubPort {

@@ -228,6 +228,13 @@ impl Flight {
         if tick / self.mission.record_ticks >= self.next_row || t >= self.mission.end {
             self.next_row = tick / self.mission.record_ticks + 1;
             let row = self.state_row(t, heard);
+            if ![row.xi, row.xi_rate, row.v_ref, row.speed_mps, row.e_norm_m, row.psi_e_rad]
+                .iter()
+                .all(|x| x.is_finite())
+            {
+                self.fail(t, "the flight has diverged: its state is no longer a number");
+                return;
+            }
             self.outputs.push_back(FlightOutput::Record(Row::Exact(Record::State(row))));
         }
     }

@@ -27,6 +27,11 @@ use crate::wire::vehicle::SpeedCommand;
 const MOST_VEHICLES: usize = 64;
 /// Longest mission \[s\]: thirty days.
 const LONGEST: f64 = 30.0 * 86_400.0;
+/// Shortest time in which links come and go \[s\], and how often they may in a mission.
+const SHORTEST_SWITCHING: f64 = 1e-3;
+const MOST_SWITCHINGS: f64 = 200_000.0;
+/// Greatest formation speed \[units of ξ per s\].
+const FASTEST: f64 = 1e6;
 
 pub(super) fn check(name: &str, text: &str) -> Result<Mission, Faults> {
     let mut faults = Collector::new(text);
@@ -152,14 +157,15 @@ fn check_times(faults: &mut Collector<'_>, file: &MissionFile) -> Option<Times> 
 fn check_formation(faults: &mut Collector<'_>, file: &MissionFile) -> Option<SpeedProfile> {
     match (&file.formation.speed, &file.formation.profile) {
         (Some(speed), None) => {
-            faults.finite("formation.speed", *speed, "units of xi per s");
+            faults.number("formation.speed", *speed, speed.abs() <= FASTEST, "-1000000 to 1000000 units of xi per s");
             Some(SpeedProfile::new(vec![SpeedCommand { at: Time::ZERO, speed: *speed }]))
         }
         (None, Some(steps)) => {
             let mut before = f64::NEG_INFINITY;
             for (i, step) in steps.iter().enumerate() {
                 let key = format!("formation.profile[{i}]");
-                faults.finite(&format!("{key}.speed"), step.speed, "units of xi per s");
+                let ok = step.speed.abs() <= FASTEST;
+                faults.number(&format!("{key}.speed"), step.speed, ok, "-1000000 to 1000000 units of xi per s");
                 let ok = if i == 0 { step.from_s == 0.0 } else { step.from_s > before && step.from_s <= LONGEST };
                 let allowed = if i == 0 { "0 for the first step" } else { "later than the step before" };
                 faults.number(&format!("{key}.from_s"), step.from_s, ok, allowed);
@@ -348,7 +354,7 @@ fn check_switching(
         SwitchingChoice::Always => Some(Switching::always(n)),
         SwitchingChoice::Periodic(p) => {
             let key = format!("{key}.periodic");
-            faults.positive(&format!("{key}.period_s"), p.period_s, "s");
+            check_period(faults, &format!("{key}.period_s"), p.period_s, file.duration_s);
             let from_ok = p.up_from_s >= 0.0 && p.up_from_s < p.period_s;
             faults.number(&format!("{key}.up_from_s"), p.up_from_s, from_ok, "0 to below period_s");
             let for_ok = p.up_for_s > 0.0 && p.up_for_s <= p.period_s;
@@ -359,7 +365,7 @@ fn check_switching(
         SwitchingChoice::Intervals(choice) => {
             let key = format!("{key}.intervals");
             if let Some(period) = choice.period_s {
-                faults.positive(&format!("{key}.period_s"), period, "s");
+                check_period(faults, &format!("{key}.period_s"), period, file.duration_s);
             }
             let mut up = Vec::new();
             for (i, interval) in choice.up.iter().enumerate() {
@@ -398,13 +404,14 @@ fn check_switching(
             let allowed = "0 to below 1: the share of time without connection that Definition 4.3 allows";
             faults.number(&format!("{key}.alpha"), r.alpha, (0.0..1.0).contains(&r.alpha), allowed);
             faults.positive(&format!("{key}.t_0_s"), r.t_0_s, "s");
+            check_period(faults, &format!("{key}.dwell_s"), r.dwell_s, file.duration_s);
             let ok = r.dwell_s > 0.0 && r.dwell_s <= r.t_0_s;
             faults.number(&format!("{key}.dwell_s"), r.dwell_s, ok, "above 0 and at most t_0_s");
             let stream = Stream::new(file.seed, "switching");
             Some(Switching::random(n, r.alpha, Span::from_secs(r.t_0_s), Span::from_secs(r.dwell_s), stream))
         }
         SwitchingChoice::OneAtATime(o) => {
-            faults.positive(&format!("{key}.one_at_a_time.dwell_s"), o.dwell_s, "s");
+            check_period(faults, &format!("{key}.one_at_a_time.dwell_s"), o.dwell_s, file.duration_s);
             let mut groups: Vec<Vec<usize>> = Vec::new();
             for (index, link) in links.iter().enumerate() {
                 let back = links[..index].iter().position(|other| (other.from, other.to) == (link.to, link.from));
@@ -416,6 +423,17 @@ fn check_switching(
             Some(Switching::one_at_a_time(n, groups, Span::from_secs(o.dwell_s)))
         }
     }
+}
+
+/// A time in which links come and go: long enough that a mission is not made of changes alone.
+fn check_period(faults: &mut Collector<'_>, key: &str, value: f64, duration: f64) {
+    let least = SHORTEST_SWITCHING.max(duration.min(LONGEST) / MOST_SWITCHINGS);
+    faults.number(
+        key,
+        value,
+        value >= least && value <= LONGEST,
+        &format!("{least} s to 30 days in a mission this long"),
+    );
 }
 
 /// Links that are up at some time must be enough for everyone's word to reach everyone.

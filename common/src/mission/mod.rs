@@ -187,6 +187,19 @@ impl Mission {
         }
     }
 
+    /// Whether every vehicle can fly at this formation speed.
+    ///
+    /// # Errors
+    /// Which one cannot, and why.
+    pub fn fits_speed(&self, speed: f64) -> Result<(), String> {
+        let fastest = self.speed.fastest().max(speed.abs());
+        for plan in &self.vehicles {
+            build::craft(plan, plan.start, self.nominal_factor(), fastest, self.law.kind())
+                .map_err(|reason| format!("{}: {reason}", plan.id))?;
+        }
+        Ok(())
+    }
+
     /// Size of one coordination message \[bytes\].
     pub fn message_bytes(&self) -> usize {
         let state = crate::wire::state::CoordinationState {
