@@ -181,9 +181,12 @@ fn plain_router() {
     std::thread::park();
 }
 
+/// Puts bytes on the plain router.
+type Put = Box<dyn Fn(&[u8])>;
+
 struct Plain {
     router: Child,
-    put: Box<dyn Fn(&[u8])>,
+    put: Put,
     _sessions: Vec<zenoh::Session>,
 }
 
@@ -336,13 +339,11 @@ fn say(line: &Line, message: &FromVehicle) {
 
 fn wait_for<M: bincode::Decode<()>>(events: &Receiver<LineEvent>, mut is_it: impl FnMut(M) -> bool) {
     loop {
-        match events.recv_timeout(Duration::from_secs(10)).expect("an answer") {
-            LineEvent::Packet { plane: Plane::Mission, bytes, .. } => {
-                if common::wire::decode::<M>(&bytes).is_ok_and(&mut is_it) {
-                    return;
-                }
-            }
-            _ => {}
+        let event = events.recv_timeout(Duration::from_secs(10)).expect("an answer");
+        if let LineEvent::Packet { plane: Plane::Mission, bytes, .. } = event
+            && common::wire::decode::<M>(&bytes).is_ok_and(&mut is_it)
+        {
+            return;
         }
     }
 }

@@ -2,10 +2,15 @@
 //! passes ten times as fast as the wall's; flights whose length matters to nobody are ended by `stop`.
 
 use std::fs;
+use std::os::unix::process::CommandExt;
+use std::process::Command;
 
 use common::mission::digest;
 use common::record::StateRow;
-use cpf_tests::{Ground, PATIENCE, Process, lasting_endpoint, mission_text, of_vehicle, state_at, states, until, with};
+use cpf_tests::{
+    Ground, PATIENCE, Process, lasting_endpoint, mission_text, of_vehicle, program, state_at, states, until, with,
+};
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde_json::Value;
 
 const IDS: [&str; 3] = ["a", "b", "c"];
@@ -213,4 +218,50 @@ fn a_vehicle_that_was_frozen_comes_back_into_line() {
         .as_array()
         .and_then(|all| all.iter().find(|one| one["vehicle"] == "c")?["missed"].as_u64());
     assert!(missed.is_some_and(|missed| missed >= 200), "two seconds at 50 ms, ten times as fast: {missed:?}");
+}
+
+/// A run that starts its own processes, in a group of its own as under a terminal, once every vehicle records.
+fn own_flight(ground: &Ground) -> Process {
+    let text = mission_text(MISSION);
+    ground.file("mission.toml", &text);
+    let mut command = Command::new(program("mission-control"));
+    let arguments = ["run", "mission.toml", "--speed-up", "10", "--listen", "tcp/127.0.0.1:0", "--out", "run"];
+    let control = ground.start("mission-control", command.args(arguments).process_group(0));
+    let logs = ground.path(&format!("run/logs/{:016x}", digest(&text)));
+    for id in IDS {
+        let log = logs.join(format!("{id}.mcap"));
+        until(PATIENCE, "every vehicle records", || fs::metadata(&log).is_ok_and(|m| m.len() > 2000));
+    }
+    control
+}
+
+fn assert_reported(ground: &Ground) {
+    let recording = ground.recording("run");
+    assert!(IDS.iter().all(|id| !states(&recording.exact, id).is_empty()));
+    assert!(ground.path("run/report.html").exists());
+}
+
+#[test]
+fn the_terminals_interrupt_ends_an_own_flight_with_its_report() {
+    let ground = Ground::new();
+    let mut control = own_flight(&ground);
+    let group = Pid::from_raw(control.id() as i32).expect("a process");
+    kill_process_group(group, Signal::INT).expect("the group exists");
+    control.ends_with(1);
+    assert_reported(&ground);
+}
+
+#[test]
+fn an_own_flight_ends_with_its_report_when_its_emulator_dies() {
+    let ground = Ground::new();
+    let mut control = own_flight(&ground);
+    let id = control.id();
+    let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux");
+    let is_emulator = |pid: &&str| {
+        fs::read_to_string(format!("/proc/{pid}/cmdline")).is_ok_and(|words| words.contains("network-emulator"))
+    };
+    let emulator = children.split_whitespace().find(is_emulator).expect("it runs").parse().expect("a number");
+    kill_process(Pid::from_raw(emulator).expect("a process"), Signal::KILL).expect("it is there");
+    control.ends_with(1);
+    assert_reported(&ground);
 }
