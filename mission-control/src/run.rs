@@ -26,7 +26,7 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::conduct::{Conduct, ConductInput, ConductOutput, Step};
 use crate::console::Progress;
-use crate::folder::{self, HostFacts, MISSION, RECORDING};
+use crate::folder::{self, HostFacts, RECORDING};
 use crate::results::Summary;
 
 /// How long own processes may take to come up.
@@ -402,9 +402,4 @@ impl Port for ConductPort<'_> {
     fn closed(&mut self) -> Ending {
         Err(Failure::Unreachable("the line to the fleet is closed".to_string()))
     }
-}
-
-/// The mission file that a run folder keeps.
-pub fn mission_of(folder: &Path) -> PathBuf {
-    folder.join(MISSION)
 }

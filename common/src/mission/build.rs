@@ -31,6 +31,8 @@ use crate::path::circle::{Circle, Turn};
 use crate::path::helix::Helix;
 use crate::path::line::Line;
 use crate::path::sinusoid::Sinusoid;
+use crate::theory::delay::steady_speed;
+use crate::time::Span;
 use crate::vehicle::auv::{Auv, AuvState};
 use crate::vehicle::dynamic_unicycle::{Parameters, State};
 use crate::vehicle::sirene::sirene;
@@ -46,6 +48,16 @@ pub(super) fn law(choice: &LawChoice) -> Result<Arc<dyn CoordinationLaw>, String
         LawChoice::Delayed(g) => Arc::new(Delayed::new(g.gain)?),
         LawChoice::DelayedWithLosses(g) => Arc::new(DelayedAlone::new(g.gain, g.delay_s)?),
     })
+}
+
+/// v_L* / v_L, as the law of a choice will make it.
+pub(super) fn nominal_factor(choice: &LawChoice) -> f64 {
+    match choice {
+        LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => {
+            steady_speed(1.0, law.gain, Span::from_secs(law.delay_s))
+        }
+        _ => 1.0,
+    }
 }
 
 /// The name of a choice in the mission file.

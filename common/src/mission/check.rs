@@ -70,7 +70,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let links = check_links(faults, file, &ids);
     let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
-    let factor = nominal_factor(&file.coordination.law);
+    let factor = build::nominal_factor(&file.coordination.law);
     let vehicles: Vec<Option<VehiclePlan>> =
         (0..file.vehicles.len()).map(|i| check_vehicle(faults, file, i, law.as_deref(), factor, fastest)).collect();
     let (times, speed, law, links, switching) = (times?, speed?, law?, links?, switching?);
@@ -214,14 +214,6 @@ fn check_law(faults: &mut Collector<'_>, file: &MissionFile) -> Option<Arc<dyn C
             faults.fault(&format!("{key}.{name}"), reason, "gains above 0");
             None
         }
-    }
-}
-
-/// v_L* / v_L, as the law will make it.
-fn nominal_factor(law: &LawChoice) -> f64 {
-    match law {
-        LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => 1.0 / (1.0 + law.gain * law.delay_s),
-        _ => 1.0,
     }
 }
 

@@ -167,12 +167,7 @@ impl Mission {
 
     /// v_L* / v_L = 1 / (1 + k τ), the speed at which delayed laws let the fleet travel (after Lemma 4.4); else 1.
     pub fn nominal_factor(&self) -> f64 {
-        match &self.law_choice {
-            file::LawChoice::Delayed(law) | file::LawChoice::DelayedWithLosses(law) => {
-                1.0 / (1.0 + law.gain * law.delay_s)
-            }
-            _ => 1.0,
-        }
+        build::nominal_factor(&self.law_choice)
     }
 
     /// The steady along-path error that the design vector δ of Theorem 4.7 leaves \[m\] (erratum 4.12), for a vehicle that
