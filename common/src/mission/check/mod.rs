@@ -1,0 +1,284 @@
+//! From the file as written to a mission that can be flown, or to everything that is wrong with it.
+
+mod coordination;
+mod network;
+mod time;
+mod vehicle;
+
+use std::collections::HashMap;
+
+use toml::de::DeTable;
+
+use self::coordination::check_law;
+use self::network::{check_links, check_switching};
+use self::time::{check_formation, check_times};
+use self::vehicle::check_vehicle;
+use super::build;
+use super::fault::{Collector, Faults};
+use super::file::{MissionFile, VehicleSection};
+use super::shape::check_shape;
+use super::{Mission, SpeedProfile, VehiclePlan, digest};
+use crate::time::Span;
+
+/// Most vehicles in a mission.
+pub(super) const MOST_VEHICLES: usize = 64;
+
+/// Longest mission \[s\]: thirty days.
+pub(super) const LONGEST: f64 = 30.0 * 86_400.0;
+
+/// Greatest formation speed \[units of ξ per s\].
+pub(super) const FASTEST: f64 = 1e6;
+
+pub(super) fn check(name: &str, text: &str) -> Result<Mission, Faults> {
+    let mut faults = Collector::new(text);
+    match DeTable::parse(text) {
+        Err(error) => {
+            let byte = error.span().map(|span| span.start);
+            faults.fault_at(byte, String::new(), error.message().to_string());
+            return Err(faults.into_faults(name));
+        }
+        Ok(table) => check_shape(&mut faults, table.get_ref()),
+    }
+    let file: MissionFile = match toml::from_str(text) {
+        Ok(file) => file,
+        Err(error) => {
+            // The shape check explains it better, unless it let something pass.
+            if faults.is_empty() {
+                let byte = error.span().map(|span| span.start);
+                faults.fault_at(byte, String::new(), error.message().to_string());
+            }
+            return Err(faults.into_faults(name));
+        }
+    };
+    match assemble(&mut faults, &file, text) {
+        Some(mission) if faults.is_empty() => Ok(mission),
+        _ => Err(faults.into_faults(name)),
+    }
+}
+
+/// Everything that is checked beyond the shape; `None` only with a fault noted.
+fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Option<Mission> {
+    check_name(faults, "name", &file.name);
+    let times = check_times(faults, file);
+    let speed = check_formation(faults, file);
+    let law = check_law(faults, file);
+    let ids = check_ids(faults, &file.vehicles);
+    let links = check_links(faults, file, &ids);
+    let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
+    let factor = build::nominal_factor(&file.coordination.law);
+    let vehicles: Vec<Option<VehiclePlan>> =
+        (0..file.vehicles.len()).map(|i| check_vehicle(faults, file, i, law.as_deref(), factor, fastest)).collect();
+    let (times, speed, law, links, switching) = (times?, speed?, law?, links?, switching?);
+    let mission = Mission {
+        digest: digest(text),
+        text: text.to_string(),
+        name: file.name.clone(),
+        about: file.about.clone(),
+        seed: file.seed,
+        end: times.end,
+        control_period: times.control_period,
+        substeps: file.clock.substeps as usize,
+        record_ticks: times.record_ticks,
+        message_ticks: times.message_ticks,
+        speed,
+        law,
+        law_choice: file.coordination.law.clone(),
+        validity: file.coordination.validity_s.map(Span::from_secs),
+        between: file.coordination.between,
+        vehicles: vehicles.into_iter().collect::<Option<Vec<_>>>()?,
+        links,
+        switching,
+        queue: file.network.queue as usize,
+    };
+    Some(mission)
+}
+
+fn is_name(text: &str) -> bool {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+    !text.is_empty() && text.len() <= 32 && text.chars().all(plain)
+}
+
+pub(super) fn check_name(faults: &mut Collector<'_>, key: &str, text: &str) {
+    if !is_name(text) {
+        faults.fault(key, format!("{text:?}"), "1 to 32 of a-z, 0-9, - and _");
+    }
+}
+
+fn check_ids(faults: &mut Collector<'_>, vehicles: &[VehicleSection]) -> HashMap<String, usize> {
+    let mut ids = HashMap::new();
+    if vehicles.is_empty() || vehicles.len() > MOST_VEHICLES {
+        faults.fault("vehicles", format!("{} vehicles", vehicles.len()), format!("1 to {MOST_VEHICLES}"));
+    }
+    for (i, vehicle) in vehicles.iter().enumerate() {
+        let key = format!("vehicles[{i}].id");
+        check_name(faults, &key, &vehicle.id);
+        if ["mission-control", "network-emulator", "operator"].contains(&vehicle.id.as_str()) {
+            faults.fault(&key, format!("{:?}", vehicle.id), "a name that is not one of the programs'");
+        }
+        if let Some(first) = ids.insert(vehicle.id.clone(), i) {
+            let found = format!("{:?}, which is vehicles[{first}] too", vehicle.id);
+            faults.fault(&key, found, "a name that no other vehicle has");
+        }
+    }
+    ids
+}
+
+pub(super) fn resolve(
+    faults: &mut Collector<'_>,
+    key: &str,
+    pair: &[String; 2],
+    ids: &HashMap<String, usize>,
+) -> Option<(usize, usize)> {
+    let mut one = |id: &String| {
+        let index = ids.get(id).copied();
+        if index.is_none() {
+            let mut known: Vec<&str> = ids.keys().map(String::as_str).collect();
+            known.sort_unstable();
+            faults.fault(key, format!("{id:?}, which is no vehicle"), known.join(", "));
+        }
+        index
+    };
+    let (a, b) = (one(&pair[0]), one(&pair[1]));
+    let (a, b) = (a?, b?);
+    if a == b {
+        faults.fault(key, format!("a link from {} to itself", pair[0]), "two different vehicles");
+        return None;
+    }
+    Some((a, b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Mission;
+
+    const HELIX: &str = include_str!("../../../../missions/auv-helix.toml");
+    const FIG_3_7: &str = include_str!("../../../../missions/thesis/fig-3-7.toml");
+
+    /// What the check says of a mission file, one fault a line.
+    fn faults(text: &str) -> Vec<String> {
+        Mission::parse("m.toml", text)
+            .err()
+            .map_or(Vec::new(), |faults| faults.to_string().lines().map(str::to_string).collect())
+    }
+
+    /// What it says of the flagship with one thing replaced.
+    fn faults_with(old: &str, new: &str) -> Vec<String> {
+        assert!(HELIX.contains(old), "{old:?} is not in the mission");
+        faults(&HELIX.replacen(old, new, 1))
+    }
+
+    #[test]
+    fn every_mission_of_the_project_can_be_flown() {
+        for (name, text) in [
+            ("auv-helix", HELIX),
+            ("fig-1-9", include_str!("../../../../missions/thesis/fig-1-9.toml")),
+            ("fig-1-10", include_str!("../../../../missions/thesis/fig-1-10.toml")),
+            ("fig-3-7", FIG_3_7),
+            ("fig-3-9", include_str!("../../../../missions/thesis/fig-3-9.toml")),
+            ("fig-4-2", include_str!("../../../../missions/thesis/fig-4-2.toml")),
+        ] {
+            let mission = Mission::parse(name, text).unwrap_or_else(|faults| panic!("{faults}"));
+            assert_eq!(mission.name, name);
+        }
+    }
+
+    #[test]
+    fn the_initial_target_is_the_closest_point_in_the_plane() {
+        // Erratum 4.23.
+        let mission = Mission::parse("m.toml", HELIX).expect("sound");
+        for (vehicle, gamma) in mission.vehicles.iter().zip([79.517, 70.483, 65.596]) {
+            assert!((vehicle.start.xi - gamma).abs() < 1e-3, "{} starts at {}", vehicle.id, vehicle.start.xi);
+        }
+    }
+
+    #[test]
+    fn the_digest_is_of_the_text() {
+        let parse = |text: &str| Mission::parse("m.toml", text).expect("sound").digest;
+        assert_eq!(parse(HELIX), parse(HELIX));
+        assert_ne!(parse(HELIX), parse(&HELIX.replace("seed = 1", "seed = 2")));
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line_and_what_is_allowed() {
+        let found = faults_with("z0_m = -5.0", "z0 = -5.0");
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].starts_with("m.toml:38: vehicles[1].path.helix.z0: found an unknown key; allowed: "),
+            "{}",
+            found[0]
+        );
+        assert!(found[0].contains("z0_m"));
+    }
+
+    #[test]
+    fn each_fault_names_its_key() {
+        for (old, new, key) in [
+            ("duration_s = 800.0", "duration_s = -1", "duration_s"),
+            ("duration_s = 800.0", "duration_s = \"long\"", "duration_s"),
+            ("control_period_s = 0.05", "control_period_s = 0.0", "clock.control_period_s"),
+            ("message_period_s = 0.1", "message_period_s = 0.07", "coordination.message_period_s"),
+            ("validity_s = 0.3", "validity_s = 0.01", "coordination.validity_s"),
+            ("gain = 0.1", "gain = -0.1", "coordination.law.delayed_with_losses"),
+            ("between = \"align\"", "between = \"guess\"", "coordination.between"),
+            ("up_for_s = 2.5", "up_for_s = 20.0", "network.switching.periodic.up_for_s"),
+            (
+                "delay = { constant = { delay_s = 5.0 } }",
+                "loss = { bernoulli = { probability = 1.5 } }",
+                "network.loss.bernoulli.probability",
+            ),
+            ("id = \"auv2\"", "id = \"auv1\"", "vehicles[1].id"),
+            ("id = \"auv2\"", "id = \"AUV 2\"", "vehicles[1].id"),
+            ("[\"auv2\", \"auv3\"]", "[\"auv2\", \"auv9\"]", "network.links[1]"),
+            (", [\"auv2\", \"auv3\"]", "", "network.links"),
+            ("kind = \"II\"", "delta1_mps = 0.3", "fleet.following"),
+            ("{ underactuated_auv = \"sirene\" }", "\"kinematic_unicycle\"", "fleet.following"),
+            ("delayed_with_losses = { gain = 0.1, delay_s = 5.0 }", "solution1 = { a = 1.0 }", "coordination.law"),
+            ("speed = 0.5", "", "formation"),
+            ("start = { x_m = 5.0, y_m = -10.0, z_m = -5.0 }", "", "vehicles[0]"),
+        ] {
+            let found = faults_with(old, new);
+            assert!(found.iter().any(|line| line.contains(&format!(": {key}"))), "{new:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_corner_is_refused_for_a_law_that_needs_a_smooth_path() {
+        let text = FIG_3_7.replacen("{ line = { length_m = 3.0 } },", "{ corner = { turn_deg = 30.0 } },", 1);
+        let found = faults(&text);
+        assert!(
+            found.iter().any(|line| line.contains("whose direction jumps") && line.contains("proposition31")),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_law_that_does_not_fit_names_both_sides() {
+        let found = faults_with("{ theorem47 = { kind = \"II\" } }", "{ proposition31 = {} }");
+        assert!(found.iter().any(|l| l.contains("proposition31 with underactuated_auv")), "{found:?}");
+    }
+
+    #[test]
+    fn several_faults_are_reported_together_in_the_order_of_the_file() {
+        let text = HELIX
+            .replace("duration_s = 800.0", "duration_s = 0")
+            .replace("up_for_s = 2.5", "up_for_s = -1")
+            .replace("id = \"auv3\"", "id = \"auv1\"")
+            .replace(
+                "climb_m = 0.05, phase_deg = -135.0, z0_m = 0.0",
+                "climb = 0.05, phase_deg = -135.0, z0_m = 0.0, climb_m = 0.05",
+            );
+        let found = faults(&text);
+        for key in ["duration_s", "up_for_s", "vehicles[2].id", "vehicles[2].path.helix.climb"] {
+            assert!(found.iter().any(|line| line.contains(key)), "{key}: {found:?}");
+        }
+        let lines: Vec<usize> = found.iter().filter_map(|l| l.split(':').nth(1)?.parse().ok()).collect();
+        assert!(lines.is_sorted(), "{found:?}");
+    }
+
+    #[test]
+    fn what_is_no_toml_is_refused_with_its_line() {
+        let found = faults("name = \"x\"\nseed = = 3\n");
+        assert!(found[0].starts_with("m.toml:2:"), "{found:?}");
+    }
+}

@@ -1,0 +1,80 @@
+//! Path-following laws and their gains.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A path-following law and its gains.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FollowingChoice {
+    /// Line of sight, (1.4).
+    LineOfSight(LineOfSight),
+    /// Proposition 3.1 with Appendix 6.1.
+    Proposition31(Proposition31),
+    /// Theorem 4.7, with the roll treatment of docs/errata.md.
+    Theorem47(Theorem47),
+}
+
+/// Gain of (1.4).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct LineOfSight {
+    /// Look-ahead distance Δ (m).
+    pub distance_m: f64,
+}
+
+/// Gains of Proposition 3.1.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct Proposition31 {
+    /// Heading gain k_1 (1/s).
+    pub k1: f64,
+    /// Approach-angle gain k_2, above 0 and at most 1.
+    pub k2: f64,
+    /// Along-path gain k_3 of the virtual target (1/s).
+    pub k3: f64,
+    /// Turn-rate gain k_4 (1/s).
+    pub k4: f64,
+    /// Length ε_0 over which the approach angle builds up (m).
+    pub epsilon_m: f64,
+    /// Gain of the speed loop when the coordination law gives a rate (1/s).
+    pub k_speed: f64,
+}
+
+impl Default for Proposition31 {
+    fn default() -> Self {
+        Proposition31 { k1: 1.0, k2: 0.6, k3: 1.0, k4: 1.0, epsilon_m: 0.3, k_speed: 2.0 }
+    }
+}
+
+/// Gains of Theorem 4.7.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct Theorem47 {
+    /// How the virtual target moves.
+    pub kind: FollowingType,
+    /// Position gain k_e (t/s).
+    pub k_e: f64,
+    /// Velocity gain k_φ (t/s).
+    pub k_phi: f64,
+    /// Turn-rate gain k_z (t m²/s).
+    pub k_z: f64,
+    /// Gain k_η of type I (1/s).
+    pub k_eta: f64,
+    /// First entry of the design vector δ, below 0 (m/s).
+    pub delta1_mps: f64,
+}
+
+impl Default for Theorem47 {
+    fn default() -> Self {
+        Theorem47 { kind: FollowingType::II, k_e: 0.5, k_phi: 1.0, k_z: 4.0, k_eta: 1.0, delta1_mps: -0.3 }
+    }
+}
+
+/// How the virtual target moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum FollowingType {
+    /// γ' = v_r + η with its own dynamics, (4.53).
+    I,
+    /// γ' = v_r.
+    II,
+}

@@ -1,0 +1,89 @@
+//! The sections `[fleet]` and `[[vehicles]]`: plants and where they start.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{FollowingChoice, PathChoice};
+
+/// What all vehicles have in common; a vehicle may differ.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+pub struct FleetSection {
+    /// The plant.
+    pub model: Option<ModelChoice>,
+    /// The path-following law.
+    pub following: Option<FollowingChoice>,
+}
+
+/// One vehicle.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleSection {
+    /// Its name: lower-case letters, digits, dash and underscore.
+    pub id: String,
+    /// The path it follows.
+    pub path: PathChoice,
+    /// Where it starts.
+    pub start: StartSection,
+    /// Its place h_i in the formation pattern: it is coordinated when xi_i - h_i agree.
+    #[serde(default)]
+    pub pattern: f64,
+    /// Its plant, if other than the fleet's.
+    pub model: Option<ModelChoice>,
+    /// Its path-following law, if other than the fleet's.
+    pub following: Option<FollowingChoice>,
+}
+
+/// Where a vehicle starts.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct StartSection {
+    /// East (m).
+    pub x_m: f64,
+    /// North (m).
+    pub y_m: f64,
+    /// Up (m).
+    #[serde(default)]
+    pub z_m: f64,
+    /// Heading, counter-clockwise from x (deg).
+    #[serde(default)]
+    pub yaw_deg: f64,
+    /// Forward speed (m/s).
+    #[serde(default)]
+    pub speed_mps: f64,
+    /// Path parameter of the virtual target; without it, of the path's point closest in the plane.
+    pub xi: Option<f64>,
+}
+
+/// A plant.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ModelChoice {
+    /// Heading and speed are commanded at will, section 1.2.
+    KinematicUnicycle,
+    /// Wheeled robot with mass and inertia, (3.12).
+    DynamicUnicycle(DynamicUnicycle),
+    /// Underactuated rigid body in 3-D, (4.44) and (4.45).
+    UnderactuatedAuv(AuvModel),
+}
+
+/// A wheeled robot's mass and inertia.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct DynamicUnicycle {
+    /// Mass m (kg).
+    pub mass_kg: f64,
+    /// Moment of inertia I about the vertical (kg m²).
+    pub inertia_kgm2: f64,
+}
+
+impl Default for DynamicUnicycle {
+    fn default() -> Self {
+        DynamicUnicycle { mass_kg: 1.0, inertia_kgm2: 1.0 }
+    }
+}
+
+/// Parameter set of an underactuated rigid body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AuvModel {
+    /// Sirene-like, derived (see `common::vehicle`).
+    Sirene,
+}
