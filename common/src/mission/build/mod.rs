@@ -1,0 +1,10 @@
+//! From the choices of the mission file to the laws, paths and vehicles they name: the one place where names and types
+//! meet.
+
+mod craft;
+mod law;
+mod path;
+
+pub(super) use craft::{auv, auv_gains, craft};
+pub(super) use law::{law, law_name, nominal_factor};
+pub(super) use path::path;
