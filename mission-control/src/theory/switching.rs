@@ -21,7 +21,7 @@ pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
 }
 
 /// Whether the virtual targets move at exactly the rate the law asks for (path following of type II, η = 0).
-fn moves_as_told(mission: &Mission) -> bool {
+pub(super) fn moves_as_told(mission: &Mission) -> bool {
     mission
         .vehicles
         .iter()
