@@ -95,6 +95,7 @@ pub enum Record {
     Message(MessageRow),
     Topology(TopologyRow),
     Speed(SpeedRow),
+    Warning(NoteRow),
 }
 
 impl Record {
@@ -105,6 +106,7 @@ impl Record {
             Record::Message(row) => row.t_ns,
             Record::Topology(row) => row.t_ns,
             Record::Speed(row) => row.t_ns,
+            Record::Warning(row) => row.t_ns,
         }
     }
 }
@@ -135,7 +137,8 @@ pub struct TicksRow {
     pub worst_late_ns: i64,
 }
 
-/// A line for people: a warning, a rejoin, a refused message, with how often it happened.
+/// A line for people: a warning, a rejoin, a refused message, with how often it happened. What a vehicle warns of at
+/// the end of its flight follows from the mission ([`Record::Warning`]); all else is of the clock ([`ClockRecord::Note`]).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[allow(missing_docs, reason = "plain")]
 pub struct NoteRow {

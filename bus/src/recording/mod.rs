@@ -6,6 +6,7 @@
 //! | `/network/topology` | [`TopologyRow`](common::record::TopologyRow) | yes |
 //! | `/vehicles/<id>/state` | [`StateRow`](common::record::StateRow) | yes |
 //! | `/network/messages` | [`MessageRow`](common::record::MessageRow) | yes |
+//! | `/mission/warnings` | [`NoteRow`](common::record::NoteRow) | yes |
 //! | `/clock/achieved` | [`AchievedRow`](common::record::AchievedRow) | no |
 //! | `/clock/ticks` | [`TicksRow`](common::record::TicksRow) | no |
 //! | `/clock/notes` | [`NoteRow`](common::record::NoteRow) | no |
