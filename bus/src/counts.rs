@@ -62,6 +62,9 @@ impl Counter {
     pub(crate) fn add_one(&self) -> u64 {
         self.0.fetch_add(1, Ordering::Relaxed) + 1
     }
+    pub(crate) fn add(&self, count: u64) {
+        self.0.fetch_add(count, Ordering::Relaxed);
+    }
     /// Undoes one [`add_one`](Self::add_one).
     pub(crate) fn take_back(&self) {
         self.0.fetch_sub(1, Ordering::Relaxed);

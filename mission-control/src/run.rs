@@ -7,12 +7,12 @@ use std::net::TcpListener;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use bus::Plane;
 use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, drive};
+use bus::drive::{Clock, Next, Port, Program, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::recording::merge;
 use bus::setup::Endpoint;
@@ -103,8 +103,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     let folder = folder.map_or_else(make_folder, Ok)?;
     let patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
     let patience = patience.map(|p| Span::from_secs(p.as_secs_f64()));
-    let mut conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !own);
-    let mut port = ConductPort {
+    let conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !own);
+    let port = ConductPort {
         line,
         own,
         processes: &mut processes,
@@ -114,7 +114,9 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         interrupted: false,
         garbage: GarbageCount::default(),
     };
-    let exit = drive(&mut conduct, &mut port, &mut Clock::from_now(), &events);
+    let program = Mutex::new(Program::new(conduct, port, Clock::from_now()));
+    let exit = drive(&program, &events);
+    let port = program.into_inner().unwrap_or_else(PoisonError::into_inner).port;
     port.progress.done();
     let collected = port.collected.clone();
     port.line.close();

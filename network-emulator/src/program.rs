@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use bus::Plane;
 use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, Rest, drive};
+use bus::drive::{Clock, Next, Port, Program, Rest, drive, hold};
 use bus::logs::Logs;
+use bus::queue::{Bell, Events};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use clap::Parser;
@@ -25,6 +26,11 @@ const START_LEAD: Duration = Duration::from_millis(500);
 
 /// How long a port that is in use is waited for.
 const PORT_PATIENCE: Duration = Duration::from_secs(2);
+
+/// So many sendings within [`BURST`] go at once, each by itself; what more there is waits for the loop, and travels in bundles.
+const SINGLE_SENDINGS: usize = 16;
+/// See [`SINGLE_SENDINGS`].
+const BURST: Duration = Duration::from_millis(1);
 
 /// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
 ///
@@ -59,25 +65,60 @@ pub fn run(args: Args) -> ExitCode {
     stop.arm();
     bus::tell!("{}", switchboard.endpoint());
     tracing::info!("network-emulator listens on {}", switchboard.endpoint());
-    let mut port = HubPort {
+    let port = HubPort {
         switchboard,
         logs: Logs::new(&args.logs, HUB),
         lines: HashMap::new(),
         ids: BTreeMap::new(),
+        seats: Vec::new(),
+        burst: Burst::default(),
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
         rest: Rest::default(),
         recording_failed: None,
     };
-    let exit = drive(&mut Hub::new(), &mut port, &mut Clock::Stopped, &events);
-    port.logs.close();
-    port.switchboard.close();
+    let program = Arc::new(Mutex::new(Program::new(Hub::new(), port, Clock::Stopped)));
+    take_shortcut(&program, events.bell());
+    let exit = drive(&program, &events);
+    // Of the transport's threads, one may hold the program for a moment more.
+    let mut program = hold(&program);
+    program.port.logs.close();
+    program.port.switchboard.close();
     exit
 }
 
+/// Lets the transport's threads decide about states as they arrive: waking the loop for each would cost more than all the
+/// rest. What comes while the program is busy, or behind others that wait, is left to the loop.
+fn take_shortcut(program: &Arc<Mutex<Program<HubPort>>>, bell: Bell<HubEvent>) {
+    let weak: Weak<Mutex<Program<HubPort>>> = Arc::downgrade(program);
+    let take = move |line: LineId, at: Instant, bytes: &[u8]| {
+        let Some(program) = weak.upgrade() else { return false };
+        let Ok(mut program) = program.try_lock() else { return false };
+        // Under the lock: the loop takes from the queue under it, too.
+        if bell.is_crowded() || program.port.seats.get(line.index()) != Some(&Some(line)) {
+            return false;
+        }
+        let awaited = program.at_once(at, HubInput::State(line.index(), bytes.into()));
+        if program.port.send_at_once(at) || awaited {
+            bell.ring();
+        }
+        true
+    };
+    hold(program).port.switchboard.set_shortcut(Box::new(take));
+}
+
+/// How much was sent of late.
+#[derive(Clone, Copy, Debug, Default)]
+struct Burst {
+    begun: Option<Instant>,
+    sendings: usize,
+    /// The loop knows that there is something to send.
+    announced: bool,
+}
+
 /// Opens the switchboard. A port in use may belong to a process that was killed a moment ago.
-fn open(listen: &Endpoint) -> bus::Result<(Switchboard, Receiver<HubEvent>)> {
+fn open(listen: &Endpoint) -> bus::Result<(Switchboard, Events<HubEvent>)> {
     let patience = Rest::default();
     loop {
         match Switchboard::open(SwitchboardConfig::new(listen.clone())) {
@@ -92,6 +133,9 @@ struct HubPort {
     logs: Logs,
     lines: HashMap<Name, LineId>,
     ids: BTreeMap<LineId, Name>,
+    /// The lines of vehicles, by number.
+    seats: Vec<Option<LineId>>,
+    burst: Burst,
     /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
@@ -106,12 +150,26 @@ fn is_control(id: &str) -> bool {
 }
 
 impl HubPort {
-    fn send(&self, id: &str, plane: Plane, bytes: &[u8]) {
+    fn send(&self, id: &str, bytes: &[u8]) {
         if let Some(line) = self.lines.get(id)
-            && let Err(error) = self.switchboard.send(*line, plane, bytes)
+            && let Err(error) = self.switchboard.send(*line, Plane::Mission, bytes)
         {
             tracing::debug!("not sent to {id}: {error}");
         }
+    }
+
+    /// Sends what the machine has just delivered, or leaves it to the loop if there is much of it; true if the loop must be
+    /// told.
+    fn send_at_once(&mut self, at: Instant) -> bool {
+        let burst = &mut self.burst;
+        if burst.begun.is_none_or(|begun| at.saturating_duration_since(begun) > BURST) {
+            (burst.begun, burst.sendings) = (Some(at), 0);
+        }
+        if burst.sendings < SINGLE_SENDINGS {
+            burst.sendings += self.switchboard.flush();
+            return false;
+        }
+        !std::mem::replace(&mut burst.announced, true)
     }
 
     fn ignore(&mut self, line: LineId, kind: Garbage) {
@@ -141,7 +199,10 @@ impl Port for HubPort {
                     return None;
                 }
                 tracing::info!("{id} joined");
-                Some((None, HubInput::Joined(id)))
+                let seat = line.index();
+                self.seats.resize(self.seats.len().max(seat + 1), None);
+                self.seats[seat] = Some(line);
+                Some((None, HubInput::Joined { id, seat }))
             }
             HubEvent::Left { line } => {
                 let id = self.ids.get(&line)?.clone();
@@ -152,8 +213,8 @@ impl Port for HubPort {
                 Some((None, HubInput::Left(id.to_string())))
             }
             HubEvent::Packet { line, plane: Plane::State, at, bytes } => {
-                let id = self.ids.get(&line)?.clone();
-                (!is_control(&id)).then_some((Some(at), HubInput::State(id, bytes)))
+                let seat = self.seats.get(line.index())?.is_some().then_some(line.index())?;
+                Some((Some(at), HubInput::State(seat, bytes.into())))
             }
             HubEvent::Packet { line, plane: Plane::Mission, bytes, .. } => {
                 let id = self.ids.get(&line)?.clone();
@@ -176,10 +237,15 @@ impl Port for HubPort {
 
     fn perform(&mut self, output: HubOutput, clock: &mut Clock) -> Next<Self> {
         match output {
-            HubOutput::ToVehicle(id, message) => self.send(&id, Plane::Mission, &wire::encode(&message)),
-            HubOutput::Deliver(id, bytes) => self.send(&id, Plane::State, &bytes),
-            HubOutput::ToControl { who, message } => self.send(&who, Plane::Mission, &wire::encode(&message)),
+            HubOutput::ToVehicle(id, message) => self.send(&id, &wire::encode(&message)),
+            HubOutput::Deliver(seat, bytes) => {
+                if let Some(Some(line)) = self.seats.get(seat) {
+                    self.switchboard.post(*line, &bytes);
+                }
+            }
+            HubOutput::ToControl { who, message } => self.send(&who, &wire::encode(&message)),
             HubOutput::Record(row) => self.logs.write(row),
+            HubOutput::Settled(settled) => self.logs.settled(&settled),
             HubOutput::CloseLog => self.logs.close(),
             HubOutput::Say(text) => tracing::info!("{text}"),
             HubOutput::OpenLog { mission, fresh } => {
@@ -210,8 +276,13 @@ impl Port for HubPort {
         Next::Go
     }
 
+    fn flush(&mut self) {
+        self.burst.announced = false;
+        self.switchboard.flush();
+    }
+
     fn tend(&mut self, hub: &Hub) -> Next<Self> {
-        if let Some(failure) = self.logs.take_failure() {
+        if let Some(failure) = self.logs.tend() {
             tracing::error!("{failure}; the network goes on without it");
             self.recording_failed = Some(failure);
         }

@@ -11,11 +11,12 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 use bus::Plane;
 use bus::line::{Line, LineConfig, LineEvent};
+use bus::queue::Events;
 use bus::setup::Endpoint;
 use common::mission::Mission;
 use common::record::ClockRecord;
@@ -297,7 +298,7 @@ impl Emulated {
                 }
             }
         });
-        std::thread::spawn(move || from_0.into_iter().for_each(drop));
+        std::thread::spawn(move || from_0.for_each(drop));
         Emulated {
             _ground: ground,
             mission,
@@ -337,7 +338,7 @@ fn say(line: &Line, message: &FromVehicle) {
     line.send(Plane::Mission, &common::wire::encode(message)).expect("sent");
 }
 
-fn wait_for<M: bincode::Decode<()>>(events: &Receiver<LineEvent>, mut is_it: impl FnMut(M) -> bool) {
+fn wait_for<M: bincode::Decode<()>>(events: &Events<LineEvent>, mut is_it: impl FnMut(M) -> bool) {
     loop {
         let event = events.recv_timeout(Duration::from_secs(10)).expect("an answer");
         if let LineEvent::Packet { plane: Plane::Mission, bytes, .. } = event

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::mpsc::Receiver;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, Rest, drive};
+use bus::drive::{Clock, Next, Port, Program, Rest, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::logs::Logs;
 use bus::setup::Endpoint;
@@ -64,7 +64,8 @@ pub fn run(args: Args) -> ExitCode {
         }
     };
     stop.arm();
-    let mut port = VehiclePort {
+    let node = VehicleNode::new(&id);
+    let port = VehiclePort {
         logs: Logs::new(&args.logs, &id),
         id,
         line,
@@ -75,15 +76,12 @@ pub fn run(args: Args) -> ExitCode {
         refused: None,
         recording_failed: false,
     };
-    let exit = fly(&mut port, &events);
+    let program = Mutex::new(Program::new(node, port, Clock::Stopped));
+    let exit = drive(&program, &events);
+    let mut port = program.into_inner().unwrap_or_else(PoisonError::into_inner).port;
     port.logs.close();
     port.line.close();
     exit
-}
-
-fn fly(port: &mut VehiclePort, events: &Receiver<LineEvent>) -> ExitCode {
-    let mut node = VehicleNode::new(&port.id);
-    drive(&mut node, port, &mut Clock::Stopped, events)
 }
 
 struct VehiclePort {
@@ -174,7 +172,7 @@ impl Port for VehiclePort {
     }
 
     fn tend(&mut self, node: &VehicleNode) -> Next<Self> {
-        if let Some(failure) = self.logs.take_failure() {
+        if let Some(failure) = self.logs.tend() {
             // A vehicle under way is worth more than its log.
             let on = if node.phase() == Phase::Running { "; the flight goes on without it" } else { "" };
             tracing::error!("{}: {failure}{on}", self.id);

@@ -15,6 +15,8 @@
 //! `sequence` counts within a channel. The mission file is the attachment `mission.toml`, and the metadata record
 //! `mission` holds its digest and the seed. Nothing in a file depends on the host or on the time of day.
 //!
+//! The emulator's own log holds what became of messages in packs (`packed.rs`), which reading and merging turn into rows.
+//!
 //! Two writers, for two needs:
 //! - [`Recorder`] writes rows as they come; [`Recorder::flush_if_due`] closes the chunk by the wall clock, so that a
 //!   killed process loses what it recorded since the last flush and no more.
@@ -23,6 +25,7 @@
 
 mod merge;
 mod order;
+pub(crate) mod packed;
 mod read;
 mod recorder;
 mod topic;
@@ -31,6 +34,7 @@ pub use merge::{CanonicalRecorder, Merged, Recovered, merge, recover};
 pub use order::{canonical_order, canonical_order_of_records};
 pub use read::{Recording, RowReader, read, read_from};
 pub use recorder::{FLUSH_PERIOD, Recorder};
+pub(crate) use topic::time_of;
 pub use topic::topic_of;
 
 use std::fmt;

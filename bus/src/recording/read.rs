@@ -1,16 +1,17 @@
 //! Rows out of an MCAP file, also of one that ends in the middle.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use common::record::{ClockRecord, Record, Row};
+use common::record::{ClockRecord, Name, Record, Row};
 use mcap::McapError;
 use mcap::records::{self, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::recorder::{DIGEST, MISSION, MISSION_FILE, SEED};
+use super::packed::unpack;
+use super::recorder::{DIGEST, MISSION, MISSION_FILE, PACKED, SEED, SETTLED, VEHICLES};
 use super::topic::Topic;
 use super::{Origin, RecordingError, Result};
 
@@ -85,8 +86,11 @@ pub struct RowReader<R: Read> {
     place: PathBuf,
     reader: LinearReader,
     topics: HashMap<u16, Topic>,
+    /// The channels of packed messages, with the vehicles' names.
+    packs: HashMap<u16, Vec<Name>>,
     origin: Origin,
-    pending: Option<Row>,
+    /// Read and not handed out yet.
+    pending: VecDeque<Row>,
     end: End,
 }
 
@@ -122,11 +126,13 @@ impl<R: Read> RowReader<R> {
             place: place.into(),
             reader: LinearReader::new_with_options(options),
             topics: HashMap::new(),
+            packs: HashMap::new(),
             origin: Origin::default(),
-            pending: None,
+            pending: VecDeque::new(),
             end: End::Ahead,
         };
-        rows.pending = rows.next_row()?;
+        let first = rows.next_row()?;
+        first.into_iter().for_each(|row| rows.pending.push_front(row));
         Ok(rows)
     }
 
@@ -184,6 +190,16 @@ impl<R: Read> RowReader<R> {
             };
             match mcap::parse_record(opcode, data) {
                 Ok(records::Record::Message { header, data }) => {
+                    if let Some(vehicles) = self.packs.get(&header.channel_id) {
+                        if !unpack(&data, vehicles, |row| self.pending.push_back(row)) {
+                            self.end = End::Failed;
+                            return Err(RecordingError::format(&self.place, "a pack of messages cannot be read"));
+                        }
+                        if let Some(row) = self.pending.pop_front() {
+                            return Ok(Some(row));
+                        }
+                        continue;
+                    }
                     let Some(topic) = self.topics.get(&header.channel_id) else { continue };
                     match topic.decode(&data) {
                         Ok(row) => return Ok(Some(row)),
@@ -193,6 +209,12 @@ impl<R: Read> RowReader<R> {
                             return Err(RecordingError::format(&self.place, what));
                         }
                     }
+                }
+                Ok(records::Record::Channel(channel))
+                    if channel.topic == SETTLED && channel.message_encoding == PACKED =>
+                {
+                    let names = channel.metadata.get(VEHICLES).map_or("", String::as_str);
+                    self.packs.insert(channel.id, names.split(',').map(Name::from).collect());
                 }
                 Ok(records::Record::Channel(channel)) => {
                     // Topics of others are skipped: a recording may be enriched with views of it.
@@ -221,7 +243,7 @@ impl<R: Read> Iterator for RowReader<R> {
     type Item = Result<Row>;
 
     fn next(&mut self) -> Option<Result<Row>> {
-        match self.pending.take() {
+        match self.pending.pop_front() {
             Some(row) => Some(Ok(row)),
             None => self.next_row().transpose(),
         }

@@ -117,7 +117,7 @@ pub fn topic_of(row: &Row) -> Cow<'static, str> {
 }
 
 /// When the row was written, in mission time \[ns\].
-pub(super) fn time_of(row: &Row) -> i64 {
+pub(crate) fn time_of(row: &Row) -> i64 {
     match row {
         Row::Exact(record) => record.t_ns(),
         Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
