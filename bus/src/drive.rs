@@ -90,8 +90,10 @@ pub trait Port {
     /// Does what the machine wants; may answer it at once, or end the program.
     fn perform(&mut self, output: Output<Self>, clock: &mut Clock) -> Next<Self>;
 
-    /// Sends what was kept back to be sent together; called before every wait.
-    fn flush(&mut self) {}
+    /// Sends what was kept back to be sent together, or says when to ask again; called before every wait.
+    fn flush(&mut self, _now: Instant) -> Option<Instant> {
+        None
+    }
 
     /// Looks after files and signals; called every 100 ms or more often.
     fn tend(&mut self, machine: &Self::Machine) -> Next<Self>;
@@ -254,11 +256,11 @@ pub fn drive<P: Port>(program: &Mutex<Program<P>>, events: &Events<P::Event>) ->
                 tend_at = moment + TEND_PERIOD;
                 program.tend();
             }
-            program.port.flush();
+            let send_at = program.port.flush(moment).unwrap_or(tend_at);
             if let Some(exit) = program.exit.take() {
                 return exit;
             }
-            let wake = program.deadline().map_or(tend_at, |deadline| deadline.min(tend_at));
+            let wake = program.deadline().map_or(tend_at, |deadline| deadline.min(tend_at)).min(send_at);
             program.awake_at = wake;
             wake
         };

@@ -11,7 +11,7 @@ use std::time::Instant;
 use crate::counts::Tally;
 use crate::outbox::{ACK_EVERY, Outbox};
 use crate::plane::{Assembled, Assembly, BUNDLE, Frame, Plane, cost, unbundle};
-use crate::queue::{Feed, Refused, Taken};
+use crate::queue::{Feed, Refused};
 
 /// Who may take a state-plane packet at once, on the transport's thread; true if it was taken.
 pub(crate) type Shortcut = dyn Fn(Instant, &[u8]) -> bool + Send + Sync;
@@ -113,39 +113,43 @@ impl<E> Inbox<E> {
             self.tally.oversized.add_one();
             return;
         }
-        while !bytes.is_empty() {
-            let Some((message, rest)) = unbundle(bytes) else {
-                self.tally.garbage.add_one();
-                return;
-            };
-            self.on_state_message(at, message);
+        // Not under the lock: who takes it may send on this very line.
+        while let Some(shortcut) = self.shortcut.get()
+            && self.is_open()
+            && let Some((message, rest)) = unbundle(bytes)
+        {
+            self.tally.state_in.add(1);
+            if !shortcut(at, message) {
+                self.tally.state_in.take_back(1);
+                break;
+            }
             bytes = rest;
         }
-    }
-
-    fn on_state_message(&self, at: Instant, message: &[u8]) {
-        // Not under the lock: who takes it may send on this very line.
-        if self.is_open()
-            && let Some(shortcut) = self.shortcut.get()
-        {
-            self.tally.state_in.add_one();
-            if shortcut(at, message) {
-                return;
-            }
-            self.tally.state_in.take_back();
+        if bytes.is_empty() {
+            return;
         }
         let _gate = self.lock();
-        if self.is_open() {
+        if !self.is_open() {
+            return;
+        }
+        let mut came = 0;
+        let messages = std::iter::from_fn(|| {
+            let (message, rest) = unbundle(bytes)?;
+            bytes = rest;
+            came += 1;
             // Before the program can see the message, so that it never finds a count behind what it holds.
-            self.tally.state_in.add_one();
-            match self.events.droppable((self.packet)(Plane::State, at, message.to_vec())) {
-                Taken::Waits => {}
-                Taken::InPlaceOfTheOldest => {
-                    self.tally.state_in.take_back();
-                    self.tally.state_dropped.add_one();
-                }
-                Taken::Nobody => self.tally.state_in.take_back(),
+            self.tally.state_in.add(1);
+            Some((self.packet)(Plane::State, at, message.to_vec()))
+        });
+        match self.events.droppable(messages) {
+            Some(dropped) => {
+                self.tally.state_in.take_back(dropped);
+                self.tally.state_dropped.add(dropped);
             }
+            None => self.tally.state_in.take_back(came),
+        }
+        if !bytes.is_empty() {
+            self.tally.garbage.add_one();
         }
     }
 
@@ -200,13 +204,13 @@ impl<E> Inbox<E> {
         match self.events.lasting((self.packet)(Plane::Mission, at, bytes)) {
             Ok(()) => {}
             Err(Refused::Full) => {
-                self.tally.mission_in.take_back();
+                self.tally.mission_in.take_back(1);
                 let so_far = self.tally.mission_dropped.add_one();
                 if so_far.is_power_of_two() {
                     tracing::error!("the program does not empty its queue: {so_far} mission messages are lost");
                 }
             }
-            Err(Refused::Nobody) => self.tally.mission_in.take_back(),
+            Err(Refused::Nobody) => self.tally.mission_in.take_back(1),
         }
     }
 }

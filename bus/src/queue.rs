@@ -91,17 +91,6 @@ impl<E> Shared<E> {
 /// The transport's end of a queue.
 pub(crate) struct Feed<E>(Arc<Shared<E>>);
 
-/// What became of a packet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Taken {
-    /// It waits for the program.
-    Waits,
-    /// It waits, and the oldest that waited is dropped.
-    InPlaceOfTheOldest,
-    /// The program listens no more.
-    Nobody,
-}
-
 /// An event was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Refused {
@@ -112,22 +101,25 @@ pub(crate) enum Refused {
 }
 
 impl<E> Feed<E> {
-    /// A packet that may be dropped.
-    pub(crate) fn droppable(&self, event: E) -> Taken {
+    /// Packets that may be dropped; how many others, the oldest, had to make place. None if the program listens no more.
+    pub(crate) fn droppable(&self, events: impl Iterator<Item = E>) -> Option<u64> {
         let mut line = self.0.lock();
         if !line.listening {
-            return Taken::Nobody;
+            return None;
         }
-        let full = line.due.droppable.len() >= self.0.capacity;
-        if full {
-            line.due.droppable.pop_front();
-        } else {
-            self.0.droppable.fetch_add(1, Ordering::Release);
+        let mut dropped = 0;
+        for event in events {
+            if line.due.droppable.len() >= self.0.capacity {
+                line.due.droppable.pop_front();
+                dropped += 1;
+            } else {
+                self.0.droppable.fetch_add(1, Ordering::Release);
+            }
+            let ticket = line.due.ticket();
+            line.due.droppable.push_back((ticket, event));
         }
-        let ticket = line.due.ticket();
-        line.due.droppable.push_back((ticket, event));
         self.0.wake(&mut line);
-        if full { Taken::InPlaceOfTheOldest } else { Taken::Waits }
+        Some(dropped)
     }
 
     /// An event that must not be dropped.
@@ -357,7 +349,7 @@ mod tests {
     fn a_waiting_message_comes_before_a_passed_deadline_and_closing_after_the_last_message() {
         let (feed, events) = queue(9);
         feed.lasting(1).expect("room");
-        feed.droppable(2);
+        feed.droppable([2].into_iter());
         let passed = Some(Instant::now());
         assert_eq!(recv_until(&events, passed), Wake::Message(1));
         assert_eq!(recv_until(&events, None), Wake::Message(2));
@@ -385,7 +377,7 @@ mod tests {
     fn who_does_not_listen_is_sent_nothing() {
         let (feed, events) = queue(1);
         drop(events);
-        assert_eq!(feed.droppable(1), Taken::Nobody);
+        assert_eq!(feed.droppable([1].into_iter()), None);
         assert_eq!(feed.lasting(1), Err(Refused::Nobody));
         assert!(!feed.announce(1));
     }
@@ -401,7 +393,7 @@ mod tests {
             let (mut dropped, mut refused) = (0, 0);
             for (number, droppable) in sent.iter().enumerate() {
                 match droppable {
-                    true => dropped += usize::from(feed.droppable(number) == Taken::InPlaceOfTheOldest),
+                    true => dropped += feed.droppable([number].into_iter()).expect("listening") as usize,
                     false => refused += usize::from(feed.lasting(number) == Err(Refused::Full)),
                 }
             }

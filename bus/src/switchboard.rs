@@ -254,6 +254,11 @@ impl Switchboard {
         count
     }
 
+    /// Whether nothing waits to be sent.
+    pub fn is_flushed(&self) -> bool {
+        self.addressed.is_empty()
+    }
+
     fn dispatch(lines: &Lines, line: LineId, posted: &mut Posted) {
         let Posted { bundle, messages } = std::mem::take(posted);
         if let Some(inbox) = lines.get(line).and_then(|line| line.inbox()).filter(|inbox| inbox.is_open()) {
@@ -281,6 +286,7 @@ impl Switchboard {
     /// Lets participants take what was sent to them (for a second at most), then closes every line and the lobby.
     /// Dropping does the same.
     pub fn close(&mut self) {
+        self.flush();
         let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner).clone();
         let deadline = Instant::now() + FAREWELL;
         let open: Vec<_> = lines.iter().filter_map(|line| line.inbox()).filter(|inbox| inbox.is_open()).collect();

@@ -27,10 +27,13 @@ const START_LEAD: Duration = Duration::from_millis(500);
 /// How long a port that is in use is waited for.
 const PORT_PATIENCE: Duration = Duration::from_secs(2);
 
-/// So many sendings within [`BURST`] go at once, each by itself; what more there is waits for the loop, and travels in bundles.
+/// So many sendings within [`BURST`] go at once, each by itself. What more there is waits for [`GATHERING`], and travels in
+/// bundles.
 const SINGLE_SENDINGS: usize = 16;
 /// See [`SINGLE_SENDINGS`].
 const BURST: Duration = Duration::from_millis(1);
+/// How long messages of a burst wait for others that go the same way.
+const GATHERING: Duration = Duration::from_micros(200);
 
 /// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
 ///
@@ -113,8 +116,8 @@ fn take_shortcut(program: &Arc<Mutex<Program<HubPort>>>, bell: Bell<HubEvent>) {
 struct Burst {
     begun: Option<Instant>,
     sendings: usize,
-    /// The loop knows that there is something to send.
-    announced: bool,
+    /// When what was gathered is sent; the loop knows of it.
+    send_at: Option<Instant>,
 }
 
 /// Opens the switchboard. A port in use may belong to a process that was killed a moment ago.
@@ -161,6 +164,9 @@ impl HubPort {
     /// Sends what the machine has just delivered, or leaves it to the loop if there is much of it; true if the loop must be
     /// told.
     fn send_at_once(&mut self, at: Instant) -> bool {
+        if self.burst.send_at.is_some() {
+            return false;
+        }
         let burst = &mut self.burst;
         if burst.begun.is_none_or(|begun| at.saturating_duration_since(begun) > BURST) {
             (burst.begun, burst.sendings) = (Some(at), 0);
@@ -169,7 +175,11 @@ impl HubPort {
             burst.sendings += self.switchboard.flush();
             return false;
         }
-        !std::mem::replace(&mut burst.announced, true)
+        if self.switchboard.is_flushed() {
+            return false;
+        }
+        burst.send_at = Some(at + GATHERING);
+        true
     }
 
     fn ignore(&mut self, line: LineId, kind: Garbage) {
@@ -276,9 +286,18 @@ impl Port for HubPort {
         Next::Go
     }
 
-    fn flush(&mut self) {
-        self.burst.announced = false;
-        self.switchboard.flush();
+    fn flush(&mut self, now: Instant) -> Option<Instant> {
+        match self.burst.send_at {
+            Some(at) if at > now => {}
+            Some(_) => {
+                self.burst.send_at = None;
+                self.burst.sendings += self.switchboard.flush();
+            }
+            None => {
+                self.send_at_once(now);
+            }
+        }
+        self.burst.send_at
     }
 
     fn tend(&mut self, hub: &Hub) -> Next<Self> {
