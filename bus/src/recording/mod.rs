@@ -23,6 +23,7 @@
 //! - [`CanonicalRecorder`] writes rows in [`order`](canonical_order) and closes chunks by size alone, so that the same
 //!   rows give the same bytes. [`merge`] makes it of the files of a fleet.
 
+mod json;
 mod merge;
 mod order;
 pub(crate) mod packed;

@@ -93,14 +93,23 @@ impl Topic {
         })
     }
 
-    /// Appends the row as JSON.
+    /// Appends the row, whose numbers are finite, as JSON.
     pub(super) fn encode(row: &Row, json: &mut Vec<u8>) -> serde_json::Result<()> {
         match row {
             Row::Exact(Record::Speed(row)) => serde_json::to_writer(json, row),
             Row::Exact(Record::Topology(row)) => serde_json::to_writer(json, row),
-            Row::Exact(Record::State(row)) => serde_json::to_writer(json, row),
-            Row::Exact(Record::Message(row)) => serde_json::to_writer(json, row),
-            Row::Clock(ClockRecord::Achieved(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::State(row)) => {
+                super::json::state(row, json);
+                Ok(())
+            }
+            Row::Exact(Record::Message(row)) => {
+                super::json::message(row, json);
+                Ok(())
+            }
+            Row::Clock(ClockRecord::Achieved(row)) => {
+                super::json::achieved(row, json);
+                Ok(())
+            }
             Row::Clock(ClockRecord::Ticks(row)) => serde_json::to_writer(json, row),
             Row::Clock(ClockRecord::Note(row)) => serde_json::to_writer(json, row),
         }
