@@ -3,6 +3,7 @@
 //!
 //! It runs on the thread that calls it, with absolute deadlines and a sharpened timer, away from every async runtime.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -228,19 +229,47 @@ impl<P: Port> Program<P> {
     }
 }
 
-/// A program that can be held by one thread at a time; one that panicked elsewhere must not take it along.
-pub fn hold<P: Port>(program: &Mutex<Program<P>>) -> MutexGuard<'_, Program<P>> {
-    program.lock().unwrap_or_else(PoisonError::into_inner)
+/// A program that one thread can hold at a time.
+pub struct Shared<P: Port> {
+    program: Mutex<Program<P>>,
+    /// The loop waits for the program. A lock knows no turns: without this, who takes it again and again would not let the
+    /// loop have it.
+    wanted: AtomicBool,
+}
+
+impl<P: Port> Shared<P> {
+    /// A program that nobody holds.
+    pub fn new(program: Program<P>) -> Shared<P> {
+        Shared { program: Mutex::new(program), wanted: AtomicBool::new(false) }
+    }
+
+    /// Waits until nobody else holds it. A thread that panicked with it must not take it along.
+    pub fn hold(&self) -> MutexGuard<'_, Program<P>> {
+        self.wanted.store(true, Ordering::Relaxed);
+        let program = self.program.lock().unwrap_or_else(PoisonError::into_inner);
+        self.wanted.store(false, Ordering::Relaxed);
+        program
+    }
+
+    /// Holds it if that takes no waiting, and nobody waits.
+    pub fn try_hold(&self) -> Option<MutexGuard<'_, Program<P>>> {
+        if self.wanted.load(Ordering::Relaxed) { None } else { self.program.try_lock().ok() }
+    }
+
+    /// The program's port, when its loop has ended.
+    pub fn into_port(self) -> P {
+        self.program.into_inner().unwrap_or_else(PoisonError::into_inner).port
+    }
 }
 
 /// Runs a program until its port ends it. It lets go of the program while it waits.
-pub fn drive<P: Port>(program: &Mutex<Program<P>>, events: &Events<P::Event>) -> P::Exit {
+pub fn drive<P: Port>(program: &Shared<P>, events: &Events<P::Event>) -> P::Exit {
     sharpen_this_thread();
     let mut tend_at = Instant::now() + TEND_PERIOD;
-    hold(program).carry_out();
+    program.hold().carry_out();
     loop {
-        let wake = {
-            let mut program = hold(program);
+        let (wake, gathering) = {
+            let mut program = program.hold();
             for _ in 0..HELPING {
                 let Some(event) = events.pop() else { break };
                 program.take(event);
@@ -256,16 +285,17 @@ pub fn drive<P: Port>(program: &Mutex<Program<P>>, events: &Events<P::Event>) ->
                 tend_at = moment + TEND_PERIOD;
                 program.tend();
             }
-            let send_at = program.port.flush(moment).unwrap_or(tend_at);
+            let send_at = program.port.flush(moment);
             if let Some(exit) = program.exit.take() {
                 return exit;
             }
-            let wake = program.deadline().map_or(tend_at, |deadline| deadline.min(tend_at)).min(send_at);
+            let wake = program.deadline().map_or(tend_at, |deadline| deadline.min(tend_at));
+            let wake = send_at.map_or(wake, |send_at| send_at.min(wake));
             program.awake_at = wake;
-            wake
+            (wake, send_at.is_some())
         };
-        if events.wait(Some(wake)) == Wake::Closed {
-            return hold(program).port.closed();
+        if events.wait(Some(wake), gathering) == Wake::Closed {
+            return program.hold().port.closed();
         }
     }
 }

@@ -136,7 +136,7 @@ impl Line {
             orders,
             link: None,
         };
-        keeper.join_hub(config.patience)?;
+        keeper.join_hub(config.patience, Duration::ZERO)?;
         let keeper = std::thread::Builder::new()
             .name("bus-line".into())
             .spawn(move || keeper.keep())
@@ -241,7 +241,8 @@ impl Keeper {
                     if !self.events.announce(LineEvent::Lost) {
                         return;
                     }
-                    match self.join_hub(None) {
+                    // That it is looked for was said.
+                    match self.join_hub(None, REMINDER) {
                         Ok(()) => tracing::info!("{}: the network-emulator is back", self.shared.id),
                         Err(Error::Refused(refusal)) => {
                             tracing::error!("{}: the network-emulator is back, but {refusal}", self.shared.id);
@@ -268,10 +269,10 @@ impl Keeper {
         }
     }
 
-    /// Tries until it works, the patience ends, the hub's refusal is final, or the program closes the line.
-    fn join_hub(&mut self, patience: Option<Duration>) -> Result<()> {
+    /// Tries until it works, at first in silence, the patience ends, the hub's refusal is final, or the program closes the line.
+    fn join_hub(&mut self, patience: Option<Duration>, silence: Duration) -> Result<()> {
         let begun = Instant::now();
-        let mut reminder = begun;
+        let mut reminder = begun + silence;
         let mut taken_since: Option<Instant> = None;
         loop {
             let left = patience.map_or(STEP, |patience| patience.saturating_sub(begun.elapsed()));
@@ -344,7 +345,7 @@ impl Keeper {
         let question = format!("{}?{}", join_key(&self.shared.id), request.encode());
         let replies = lobby.get(question).timeout(step).wait().map_err(|error| absent(&error.to_string()))?;
         let Ok(reply) = replies.recv() else {
-            return Err(absent("something listens there, but it is not a network-emulator"));
+            return Err(absent("something listens there, but does not answer as a network-emulator"));
         };
         match reply.result() {
             Ok(sample) => {

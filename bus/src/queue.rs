@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// A queue for at most `capacity` state-plane packets and as many other events.
 pub(crate) fn queue<E>(capacity: usize) -> (Feed<E>, Events<E>) {
-    let line = Line { due: Inner::default(), feeds: 1, listening: true, waiting: false, nudged: false };
+    let line = Line { due: Inner::default(), feeds: 1, listening: true, waiting: false, patient: false, nudged: false };
     let shared = Arc::new(Shared {
         line: Mutex::new(line),
         changed: Condvar::new(),
@@ -37,6 +37,8 @@ struct Line<E> {
     feeds: usize,
     listening: bool,
     waiting: bool,
+    /// The program waits, and not for packets.
+    patient: bool,
     nudged: bool,
 }
 
@@ -118,7 +120,9 @@ impl<E> Feed<E> {
             let ticket = line.due.ticket();
             line.due.droppable.push_back((ticket, event));
         }
-        self.0.wake(&mut line);
+        if !line.patient {
+            self.0.wake(&mut line);
+        }
         Some(dropped)
     }
 
@@ -201,14 +205,16 @@ pub enum Wake<T> {
 
 impl<E> Events<E> {
     /// Waits until an event is there, a [`Bell`] rings, or the deadline has passed (`None`: never): [`Wake::Message`] in the
-    /// first two cases, and [`Wake::Deadline`] never early.
-    pub fn wait(&self, deadline: Option<Instant>) -> Wake<()> {
+    /// first two cases, and [`Wake::Deadline`] never early. With `patience`, packets that may be dropped do not end the wait:
+    /// in a flood of them it is cheaper to wait for many than to be woken for each.
+    pub fn wait(&self, deadline: Option<Instant>, patience: bool) -> Wake<()> {
         if !self.taken.borrow().is_empty() {
             return Wake::Message(());
         }
         let mut line = self.shared.lock();
         loop {
-            if !line.due.is_empty() || line.nudged {
+            line.patient = false;
+            if !line.due.lasting.is_empty() || line.nudged || !(patience || line.due.droppable.is_empty()) {
                 line.nudged = false;
                 return Wake::Message(());
             }
@@ -216,6 +222,7 @@ impl<E> Events<E> {
                 return Wake::Closed;
             }
             line.waiting = true;
+            line.patient = patience;
             let changed = &self.shared.changed;
             line = match deadline {
                 None => changed.wait(line).unwrap_or_else(PoisonError::into_inner),
@@ -223,6 +230,7 @@ impl<E> Events<E> {
                     let left = deadline.saturating_duration_since(Instant::now());
                     if left == Duration::ZERO {
                         line.waiting = false;
+                        line.patient = false;
                         return Wake::Deadline;
                     }
                     changed.wait_timeout(line, left).unwrap_or_else(PoisonError::into_inner).0
@@ -320,7 +328,7 @@ pub fn recv_until<E>(events: &Events<E>, deadline: Option<Instant>) -> Wake<E> {
         if let Some(event) = events.pop() {
             return Wake::Message(event);
         }
-        match events.wait(deadline) {
+        match events.wait(deadline, false) {
             Wake::Message(()) => {}
             Wake::Deadline => return Wake::Deadline,
             Wake::Closed => return Wake::Closed,
@@ -368,9 +376,20 @@ mod tests {
     fn a_bell_ends_one_wait_and_is_not_forgotten() {
         let (_feed, events) = queue::<()>(1);
         events.bell().ring();
-        assert_eq!(events.wait(None), Wake::Message(()));
+        assert_eq!(events.wait(None, false), Wake::Message(()));
         assert_eq!(events.pop(), None);
-        assert_eq!(events.wait(Some(Instant::now())), Wake::Deadline);
+        assert_eq!(events.wait(Some(Instant::now()), false), Wake::Deadline);
+    }
+
+    #[test]
+    fn patience_is_not_disturbed_by_packets() {
+        let (feed, events) = queue(9);
+        feed.droppable([1].into_iter());
+        let soon = Some(Instant::now() + Duration::from_millis(1));
+        assert_eq!(events.wait(soon, true), Wake::Deadline);
+        feed.lasting(2).expect("room");
+        assert_eq!(events.wait(None, true), Wake::Message(()));
+        assert_eq!((events.pop(), events.pop()), (Some(1), Some(2)));
     }
 
     #[test]

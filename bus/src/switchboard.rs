@@ -44,9 +44,9 @@ pub struct SwitchboardConfig {
 }
 
 impl SwitchboardConfig {
-    /// 256 lines and 65 536 waiting events.
+    /// 512 lines and 65 536 waiting packets of each plane.
     pub fn new(endpoint: Endpoint) -> SwitchboardConfig {
-        SwitchboardConfig { endpoint, max_lines: 256, queue: 1 << 16 }
+        SwitchboardConfig { endpoint, max_lines: 512, queue: 1 << 16 }
     }
 }
 

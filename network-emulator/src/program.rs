@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use bus::Plane;
-use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, Program, Rest, drive, hold};
+use bus::console::{Parent, StopFlag};
+use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::logs::Logs;
 use bus::queue::{Bell, Events};
 use bus::setup::Endpoint;
@@ -53,6 +53,9 @@ pub struct Args {
     /// End when mission-control has collected the logs of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
+    /// End when standard input is closed, but not before a flight under way is over: what started this process is gone
+    #[arg(long, hide = true)]
+    pub end_with_stdin: bool,
 }
 
 /// Runs the program to its end.
@@ -78,14 +81,15 @@ pub fn run(args: Args) -> ExitCode {
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
+        parent: args.end_with_stdin.then(Parent::at_stdin),
         rest: Rest::default(),
         recording_failed: None,
     };
-    let program = Arc::new(Mutex::new(Program::new(Hub::new(), port, Clock::Stopped)));
+    let program = Arc::new(Shared::new(Program::new(Hub::new(), port, Clock::Stopped)));
     take_shortcut(&program, events.bell());
     let exit = drive(&program, &events);
     // Of the transport's threads, one may hold the program for a moment more.
-    let mut program = hold(&program);
+    let mut program = program.hold();
     program.port.logs.close();
     program.port.switchboard.close();
     exit
@@ -93,11 +97,11 @@ pub fn run(args: Args) -> ExitCode {
 
 /// Lets the transport's threads decide about states as they arrive: waking the loop for each would cost more than all the
 /// rest. What comes while the program is busy, or behind others that wait, is left to the loop.
-fn take_shortcut(program: &Arc<Mutex<Program<HubPort>>>, bell: Bell<HubEvent>) {
-    let weak: Weak<Mutex<Program<HubPort>>> = Arc::downgrade(program);
+fn take_shortcut(program: &Arc<Shared<HubPort>>, bell: Bell<HubEvent>) {
+    let weak: Weak<Shared<HubPort>> = Arc::downgrade(program);
     let take = move |line: LineId, at: Instant, bytes: &[u8]| {
         let Some(program) = weak.upgrade() else { return false };
-        let Ok(mut program) = program.try_lock() else { return false };
+        let Some(mut program) = program.try_hold() else { return false };
         // Under the lock: the loop takes from the queue under it, too.
         if bell.is_crowded() || program.port.seats.get(line.index()) != Some(&Some(line)) {
             return false;
@@ -108,7 +112,7 @@ fn take_shortcut(program: &Arc<Mutex<Program<HubPort>>>, bell: Bell<HubEvent>) {
         }
         true
     };
-    hold(program).port.switchboard.set_shortcut(Box::new(take));
+    program.hold().port.switchboard.set_shortcut(Box::new(take));
 }
 
 /// How much was sent of late.
@@ -143,6 +147,8 @@ struct HubPort {
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
     once: bool,
+    /// Who started this process for itself.
+    parent: Option<Parent>,
     rest: Rest,
     /// Why recording failed; the flight is stopped at the next opportunity.
     recording_failed: Option<String>,
@@ -307,6 +313,10 @@ impl Port for HubPort {
         }
         if self.once && self.rest.is_over(hub.phase() == Phase::Running) {
             tracing::warn!("nothing to fly for ten minutes; ended");
+            return Next::Exit(self.exit_code());
+        }
+        if self.parent.as_ref().is_some_and(Parent::is_gone) && hub.phase() != Phase::Running {
+            tracing::info!("mission-control is gone; ended");
             return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {

@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, Program, Rest, drive};
+use bus::console::{Parent, StopFlag};
+use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::logs::Logs;
 use bus::setup::Endpoint;
@@ -48,6 +47,9 @@ pub struct Args {
     /// End when mission-control has collected the log of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
+    /// End when standard input is closed, but not before a flight under way is over: what started this process is gone
+    #[arg(long, hide = true)]
+    pub end_with_stdin: bool,
 }
 
 /// Runs the program to its end.
@@ -71,14 +73,15 @@ pub fn run(args: Args) -> ExitCode {
         line,
         stop,
         once: args.once,
+        parent: args.end_with_stdin.then(Parent::at_stdin),
         rest: Rest::default(),
         garbage: GarbageCount::default(),
         refused: None,
         recording_failed: false,
     };
-    let program = Mutex::new(Program::new(node, port, Clock::Stopped));
+    let program = Shared::new(Program::new(node, port, Clock::Stopped));
     let exit = drive(&program, &events);
-    let mut port = program.into_inner().unwrap_or_else(PoisonError::into_inner).port;
+    let mut port = program.into_port();
     port.logs.close();
     port.line.close();
     exit
@@ -90,6 +93,8 @@ struct VehiclePort {
     logs: Logs,
     stop: StopFlag,
     once: bool,
+    /// Who started this process for itself.
+    parent: Option<Parent>,
     rest: Rest,
     garbage: GarbageCount,
     refused: Option<Refusal>,
@@ -184,6 +189,10 @@ impl Port for VehiclePort {
         }
         if self.once && self.rest.is_over(node.phase() == Phase::Running) {
             tracing::warn!("{}: nothing to fly for ten minutes; ended", self.id);
+            return Next::Exit(self.exit_code());
+        }
+        if self.parent.as_ref().is_some_and(Parent::is_gone) && node.phase() != Phase::Running {
+            tracing::info!("{}: mission-control is gone; ended", self.id);
             return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {

@@ -132,6 +132,7 @@ impl<W: Write + Seek> Recorder<W> {
             None => {
                 let metadata = BTreeMap::from([(VEHICLES.to_owned(), vehicles.join(","))]);
                 let id = self.mcap.add_channel(0, SETTLED, PACKED, &metadata)?;
+                self.mcap.flush()?;
                 Channel { id, sequence: 0 }
             }
         };
@@ -274,6 +275,8 @@ fn add_channel<W: Write + Seek>(mcap: &mut Writer<W>, topic: Topic, vehicle: &st
     let (name, schema) = topic.schema();
     let schema = mcap.add_schema(name, "jsonschema", &schema)?;
     let id = mcap.add_channel(schema, &topic.name(vehicle), "json", &BTreeMap::new())?;
+    // In a chunk of its own: a damaged row must not take along what the later ones need.
+    mcap.flush()?;
     Ok(Channel { id, sequence: 0 })
 }
 
