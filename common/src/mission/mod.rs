@@ -4,6 +4,7 @@ mod build;
 mod check;
 mod fault;
 pub mod file;
+mod read;
 mod shape;
 mod speed;
 
@@ -11,7 +12,8 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-pub use fault::{Fault, Faults};
+pub use fault::{Collector, Fault, Faults};
+pub use read::read;
 pub use shape::schema;
 pub use speed::SpeedProfile;
 
