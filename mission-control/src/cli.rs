@@ -11,6 +11,8 @@ use common::mission::Mission;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::Phase;
 
+use crate::console::Count;
+use crate::gallery::{GALLERY, Gallery};
 use crate::results::{Summary, TheoryRow, diff, export_csv};
 use crate::run::{Failure, Plan, fly};
 use crate::{folder, operator, rehearse, theory};
@@ -57,6 +59,14 @@ enum What {
     },
     /// Fly a mission as real processes: one per vehicle, one for the network between them
     Run(RunArgs),
+    /// Fly all missions of a folder and show them on one page, with the numbers expected of them (exit code 1: one disagrees)
+    Gallery {
+        /// The folder: missions, and gallery.toml, which says what figures they make
+        missions: PathBuf,
+        /// Where the page goes
+        #[arg(long, value_name = "DIR", default_value = "runs/gallery")]
+        out: PathBuf,
+    },
     /// Set the formation speed of the fleet under way
     Speed {
         /// The speed v_L (units of xi per s)
@@ -157,9 +167,6 @@ enum Format {
     Csv,
 }
 
-/// Longest mission file (bytes).
-const MISSION_BYTES: u64 = 1 << 20;
-
 /// How long a single command waits for the fleet to appear.
 const COMMAND_PATIENCE: Duration = Duration::from_secs(3);
 
@@ -184,6 +191,7 @@ fn run(what: What) -> Ended {
         What::Check { mission, json } => check(&mission, json),
         What::Simulate { mission, out, json } => simulate(&mission, out.as_deref(), json),
         What::Run(args) => run_fleet(args),
+        What::Gallery { missions, out } => gallery(&missions, &out),
         What::Speed { speed, fleet } => speed_command(speed, &fleet.attach),
         What::Status { json, fleet } => status(json, &fleet.attach),
         What::Stop { fleet } => stop(&fleet.attach),
@@ -201,22 +209,7 @@ fn run(what: What) -> Ended {
 }
 
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
-    let unreadable =
-        |error: std::io::Error| End(2, format!("cannot read the mission file {}: {error}", path.display()));
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    std::io::Read::read_to_string(&mut std::io::Read::take(file, MISSION_BYTES + 1), &mut text).map_err(unreadable)?;
-    if text.len() as u64 > MISSION_BYTES {
-        let reason = format!("the mission file {} is too long; allowed: {MISSION_BYTES} bytes", path.display());
-        return Err(End(2, reason));
-    }
-    Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
-        let n = faults.list.len();
-        End(
-            2,
-            format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display()),
-        )
-    })
+    folder::load(path).map_err(|reason| End(2, reason))
 }
 
 fn check(path: &Path, json: bool) -> Ended {
@@ -373,6 +366,28 @@ fn stop(endpoint: &Endpoint) -> Ended {
     ask(endpoint, &ToFleet::Stop)?;
     bus::tell!("stopped");
     Ok(ExitCode::SUCCESS)
+}
+
+fn gallery(missions: &Path, out: &Path) -> Ended {
+    let gallery = Gallery::read(missions).map_err(|reason| End(2, reason))?;
+    let mut progress = Count::new("flying", gallery.missions());
+    let outcome = gallery.make(out, |name| progress.one_more(name));
+    progress.done();
+    let outcome = outcome.map_err(|reason| End(4, reason))?;
+    for name in &outcome.unused {
+        bus::remark!("warning: {name} is in no figure of {GALLERY}");
+    }
+    for fault in &outcome.faults {
+        bus::remark!("{fault}");
+    }
+    let agree = if outcome.faults.is_empty() { "all agree" } else { "not all agree" };
+    bus::tell!(
+        "{} figures, {} expected numbers, {agree}: {}",
+        outcome.figures,
+        outcome.expected,
+        out.join("index.html").display()
+    );
+    Ok(if outcome.faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn report(run: &Path) -> Ended {

@@ -21,7 +21,7 @@ mod series;
 pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 pub use diff::{Outcome, Side, diff, origins_differ};
 pub use export::{Exporter, export_csv};

@@ -424,7 +424,7 @@ pub(crate) fn number(value: f64) -> String {
     format!("{minus}{text}")
 }
 
-const STYLE: &str = include_str!("report.css");
+pub(crate) const STYLE: &str = include_str!("report.css");
 
 #[cfg(test)]
 mod tests {
