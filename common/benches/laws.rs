@@ -24,7 +24,10 @@ use nalgebra::Vector3;
 static ALLOCATIONS: divan::AllocProfiler = divan::AllocProfiler::system();
 
 const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
-const NEIGHBOURS: [Neighbour; 2] = [Neighbour { xi: 0.1, eta_over_r: 0.0 }, Neighbour { xi: -0.1, eta_over_r: 0.01 }];
+const NEIGHBOURS: [Neighbour; 2] = [
+    Neighbour { vehicle: 1, xi: 0.1, scalar: 0.0, said: 0.1, age: 0.0 },
+    Neighbour { vehicle: 1, xi: -0.1, scalar: 0.01, said: -0.1, age: 0.0 },
+];
 
 fn main() {
     divan::main();

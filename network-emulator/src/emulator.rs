@@ -362,7 +362,7 @@ mod tests {
     }
 
     fn state(mission: &Mission, sender: u16, seq: u32) -> Vec<u8> {
-        CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi: 1.0, eta_over_r: None }.encode()
+        CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi: 1.0, scalar: None }.encode()
     }
 
     fn seconds(t: f64) -> Time {

@@ -313,14 +313,8 @@ impl Emulated {
     fn send(&self) -> u32 {
         let seq = self.seq.get();
         self.seq.set(seq + 1);
-        let state = CoordinationState {
-            mission: self.mission.digest,
-            sender: 0,
-            seq,
-            made: Time::ZERO,
-            xi: 1.0,
-            eta_over_r: None,
-        };
+        let state =
+            CoordinationState { mission: self.mission.digest, sender: 0, seq, made: Time::ZERO, xi: 1.0, scalar: None };
         let _ = self.sender.send(Plane::State, &state.encode());
         seq
     }

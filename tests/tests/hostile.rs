@@ -113,7 +113,7 @@ fn garbage(number: u64, mission: &Mission) -> Vec<u8> {
         seq: 1_000_000 + number as u32,
         made: Time::from_secs(1.0),
         xi: 1e6,
-        eta_over_r: None,
+        scalar: None,
     };
     let noise = |length: usize| {
         let mut x = number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
@@ -161,8 +161,7 @@ fn whatever_one_vehicle_says_the_others_fly_on_and_agree() {
     // A first helping, so that every queue and table has its size.
     (0..20_000).for_each(|number| hostile.says(garbage(number, &plan)));
     let before = resident_kib(&emulator);
-    let own =
-        CoordinationState { mission: plan.digest, sender: 2, seq: 0, made: Time::ZERO, xi: -50.0, eta_over_r: None };
+    let own = CoordinationState { mission: plan.digest, sender: 2, seq: 0, made: Time::ZERO, xi: -50.0, scalar: None };
     hostile.says(own.encode());
     for number in 20_000..200_000 {
         match number % 200 {

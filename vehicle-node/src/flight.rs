@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use common::coordination::VehicleLaw;
 use common::craft::Craft;
 use common::machine::Machine;
 use common::mission::{Mission, SpeedProfile, Start};
@@ -45,6 +46,7 @@ pub struct Flight {
     me: usize,
     name: Name,
     craft: Box<dyn Craft>,
+    law: Box<dyn VehicleLaw>,
     neighbours: Neighbours,
     speed: SpeedProfile,
     /// The next control period to run, and the last one run.
@@ -108,6 +110,7 @@ impl Flight {
         Ok(Flight {
             name: mission.vehicles[me].id.as_str().into(),
             craft: mission.craft(me, start)?,
+            law: mission.law.vehicle(me),
             neighbours: Neighbours::new(&mission, me),
             speed: mission.speed.clone(),
             next: (now.nanos() + period - 1).div_euclid(period).max(0),
@@ -172,7 +175,9 @@ impl Flight {
         let tick = due;
         if let Some(last) = self.last {
             for _ in last..tick {
-                self.craft.advance(self.mission.control_period.secs(), self.mission.substeps);
+                let period = self.mission.control_period.secs();
+                self.craft.advance(period, self.mission.substeps);
+                self.law.advance(period);
             }
         }
         if !self.craft.is_sound() {
@@ -201,7 +206,7 @@ impl Flight {
         let mut own = self.craft.own(reference);
         own.xi -= plan.pattern;
         let present = self.neighbours.present(t, reference.v_l);
-        let demand = self.mission.law.demand(reference, &own, present);
+        let demand = self.law.demand(reference, &own, present);
         let heard = present.len() as u16;
         self.craft.command(reference, demand);
 
@@ -216,9 +221,9 @@ impl Flight {
                 seq: number as u32,
                 made: t,
                 xi: own.xi,
-                eta_over_r: self.mission.law.needs_speed_error().then_some(own.eta / own.r),
+                scalar: self.law.says(&own),
             };
-            if state.xi.is_finite() && state.eta_over_r.is_none_or(f64::is_finite) {
+            if state.xi.is_finite() && state.scalar.is_none_or(f64::is_finite) {
                 self.outputs.push_back(FlightOutput::Transmit(state.encode()));
             } else {
                 self.fail(t, "the coordination state is not a number");
@@ -382,7 +387,7 @@ mod tests {
         flight.handle(Time::ZERO, None);
         let outputs = outputs(&mut flight);
         let [said] = transmitted(&outputs)[..] else { panic!("one message at the start, not {outputs:?}") };
-        assert_eq!((said.sender, said.seq, said.made, said.eta_over_r), (0, 0, Time::ZERO, None));
+        assert_eq!((said.sender, said.seq, said.made, said.scalar), (0, 0, Time::ZERO, None));
         assert!((said.xi - 79.517).abs() < 1e-3);
     }
 
@@ -425,14 +430,8 @@ mod tests {
     #[test]
     fn a_message_at_the_instant_of_a_period_is_heard_by_the_next_one() {
         let mission = mission();
-        let state = CoordinationState {
-            mission: mission.digest,
-            sender: 1,
-            seq: 0,
-            made: Time::ZERO,
-            xi: 0.0,
-            eta_over_r: None,
-        };
+        let state =
+            CoordinationState { mission: mission.digest, sender: 1, seq: 0, made: Time::ZERO, xi: 0.0, scalar: None };
         let heard_at = |at: f64| {
             let mut flight = Flight::new(mission.clone(), 0, None).expect("flies");
             let inputs = [(Time::from_secs(at), FlightInput::Heard(state.encode()))];
@@ -465,7 +464,7 @@ mod tests {
             seq: 950,
             made: Time::from_secs(95.0),
             xi: 110.0,
-            eta_over_r: None,
+            scalar: None,
         };
         flight.handle(now, Some(FlightInput::Heard(state.encode())));
         flight.handle(now, None);

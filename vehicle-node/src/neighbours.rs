@@ -96,7 +96,8 @@ impl Neighbours {
     /// N_i at this instant, with what stands for each neighbour's state.
     pub fn present(&mut self, now: Time, v_l: f64) -> &[Neighbour] {
         self.present.clear();
-        for heard in self.heard.iter().flatten() {
+        for (vehicle, heard) in self.heard.iter().enumerate() {
+            let Some(heard) = heard else { continue };
             if self.validity.is_some_and(|validity| now - heard.arrived > validity) {
                 continue;
             }
@@ -106,7 +107,8 @@ impl Neighbours {
                 Between::Advance => heard.state.xi + v_l * age,
                 Between::Align => heard.state.xi + self.nominal_factor * v_l * (age - self.law_delay),
             };
-            self.present.push(Neighbour { xi, eta_over_r: heard.state.eta_over_r.unwrap_or(0.0) });
+            let scalar = heard.state.scalar.unwrap_or(0.0);
+            self.present.push(Neighbour { vehicle, xi, scalar, said: heard.state.xi, age });
         }
         &self.present
     }
@@ -136,7 +138,7 @@ mod tests {
     fn said(mission: &Mission, sender: u16, made_s: f64, xi: f64) -> Vec<u8> {
         let made = Time::from_secs(made_s);
         let seq = (made_s * 10.0) as u32;
-        CoordinationState { mission: mission.digest, sender, seq, made, xi, eta_over_r: None }.encode()
+        CoordinationState { mission: mission.digest, sender, seq, made, xi, scalar: None }.encode()
     }
 
     /// What stands at 21.05 s for a neighbour that said 10 at 16 s, heard at 21 s.

@@ -70,7 +70,7 @@ mod tests {
 
     #[test]
     fn alone_it_travels_at_v_l() {
-        let own = Own { xi: 3.0, eta: 0.0, r: 1.0 };
+        let own = Own { xi: 3.0, eta: 0.0, r: 1.0, ..Own::default() };
         let reference = SpeedReference { v_l: 0.5, v_l_dot: 0.0 };
         assert_eq!(Delayed::new(0.3).unwrap().demand(reference, &own, &[]), Demand::Rate(0.5));
     }

@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn alone_it_travels_at_v_l_star() {
-        let own = Own { xi: 3.0, eta: 0.0, r: 1.0 };
+        let own = Own { xi: 3.0, eta: 0.0, r: 1.0, ..Own::default() };
         let reference = SpeedReference { v_l: 0.5, v_l_dot: 0.0 };
         assert_eq!(law().demand(reference, &own, &[]), Demand::Rate(V_L_STAR));
         let prompt = DelayedAlone::new(0.1, 0.0).unwrap();

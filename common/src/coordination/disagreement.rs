@@ -18,10 +18,10 @@ impl Disagreement {
     /// no message can make a law answer with NaN.
     pub fn among(own: &Own, neighbours: &[Neighbour]) -> Disagreement {
         let own_speed = c(own) * own.eta;
-        let heard = neighbours.iter().filter(|other| other.xi.is_finite() && other.eta_over_r.is_finite());
+        let heard = neighbours.iter().filter(|other| other.xi.is_finite() && other.scalar.is_finite());
         heard.fold(Disagreement::default(), |sum, other| Disagreement {
             ahead: sum.ahead + (own.xi - other.xi),
-            faster: sum.faster + (own_speed - other.eta_over_r),
+            faster: sum.faster + (own_speed - other.scalar),
             neighbours: sum.neighbours + 1,
         })
     }
@@ -42,29 +42,37 @@ mod tests {
     use super::{Disagreement, c};
     use crate::coordination::{Neighbour, Own};
 
-    const OWN: Own = Own { xi: 3.0, eta: 0.5, r: 2.0 };
+    fn own() -> Own {
+        Own { xi: 3.0, eta: 0.5, r: 2.0, ..Own::default() }
+    }
 
     #[test]
     fn the_rows_of_the_laplacian() {
-        let neighbours = [Neighbour { xi: 1.0, eta_over_r: 0.0 }, Neighbour { xi: 4.0, eta_over_r: 0.75 }];
+        let neighbours = [
+            Neighbour { xi: 1.0, scalar: 0.0, ..Neighbour::default() },
+            Neighbour { xi: 4.0, scalar: 0.75, ..Neighbour::default() },
+        ];
         let expected = Disagreement { ahead: 1.0, faster: 0.25 - 0.5, neighbours: 2 };
-        assert_eq!(Disagreement::among(&OWN, &neighbours), expected);
+        assert_eq!(Disagreement::among(&own(), &neighbours), expected);
         assert_eq!(expected.mean_ahead(), 0.5);
     }
 
     #[test]
     fn alone_there_is_none() {
-        assert_eq!(Disagreement::among(&OWN, &[]).mean_ahead(), 0.0);
+        assert_eq!(Disagreement::among(&own(), &[]).mean_ahead(), 0.0);
     }
 
     #[test]
     fn what_is_no_number_was_not_heard() {
-        let strange = [Neighbour { xi: f64::NAN, eta_over_r: 0.0 }, Neighbour { xi: 0.0, eta_over_r: f64::INFINITY }];
-        assert_eq!(Disagreement::among(&OWN, &strange), Disagreement::default());
+        let strange = [
+            Neighbour { xi: f64::NAN, scalar: 0.0, ..Neighbour::default() },
+            Neighbour { xi: 0.0, scalar: f64::INFINITY, ..Neighbour::default() },
+        ];
+        assert_eq!(Disagreement::among(&own(), &strange), Disagreement::default());
     }
 
     #[test]
     fn a_path_that_stands_still_gives_no_infinite_gain() {
-        assert_eq!((c(&OWN), c(&Own { r: 0.0, ..OWN }), c(&Own { r: f64::NAN, ..OWN })), (0.5, 0.0, 0.0));
+        assert_eq!((c(&own()), c(&Own { r: 0.0, ..own() }), c(&Own { r: f64::NAN, ..own() })), (0.5, 0.0, 0.0));
     }
 }

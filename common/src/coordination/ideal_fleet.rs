@@ -52,10 +52,15 @@ impl<const N: usize> Network<'_, N> {
 
     /// What the law asks of vehicle `i` when the others are heard as in `heard`.
     fn demand(&self, law: &dyn CoordinationLaw, i: usize, fleet: &Fleet<N>, heard: &Fleet<N>) -> Demand {
-        let own = Own { xi: fleet.xi[i], eta: fleet.eta[i], r: self.r[i] };
+        let own = Own { xi: fleet.xi[i], eta: fleet.eta[i], r: self.r[i], ..Own::default() };
         let neighbours: Vec<Neighbour> = self.hears[i]
             .iter()
-            .map(|&j| Neighbour { xi: heard.xi[j], eta_over_r: heard.eta[j] / self.r[j] })
+            .map(|&j| Neighbour {
+                xi: heard.xi[j],
+                scalar: heard.eta[j] / self.r[j],
+                vehicle: j,
+                ..Neighbour::default()
+            })
             .collect();
         law.demand(SpeedReference { v_l: self.v_l, v_l_dot: 0.0 }, &own, &neighbours)
     }
@@ -66,7 +71,8 @@ impl<const N: usize> Network<'_, N> {
         for i in 0..N {
             match self.demand(law, i, fleet, fleet) {
                 Demand::Rate(v_r) => rate.xi[i] = v_r,
-                Demand::Acceleration(u) => {
+                // With R and v_L constant, u = dη/dt = dv/dt.
+                Demand::Acceleration(u) | Demand::Forward(u) => {
                     rate.xi[i] = fleet.eta[i] / self.r[i] + self.v_l;
                     rate.eta[i] = u;
                 }
@@ -106,7 +112,7 @@ impl<const N: usize> Network<'_, N> {
     pub(super) fn v_r(&self, law: &dyn CoordinationLaw, i: usize, now: &Fleet<N>, heard: &Fleet<N>) -> f64 {
         match self.demand(law, i, now, heard) {
             Demand::Rate(v_r) => v_r,
-            Demand::Acceleration(_) => panic!("the law does not give rates"),
+            Demand::Acceleration(_) | Demand::Forward(_) => panic!("the law does not give rates"),
         }
     }
 }
@@ -134,19 +140,19 @@ pub(super) fn run_delayed_with<const N: usize>(
 /// than one behind all others: what every coordination law must satisfy.
 pub(super) fn assert_shift_invariant_and_ahead_slows_down(law: &dyn CoordinationLaw) {
     let value = |demand| match demand {
-        Demand::Rate(value) | Demand::Acceleration(value) => value,
+        Demand::Rate(value) | Demand::Acceleration(value) | Demand::Forward(value) => value,
     };
     let reference = SpeedReference { v_l: 0.5, v_l_dot: 0.1 };
     // Values that binary fractions represent, so that the shift is exact.
     let demand = |own: f64, others: [f64; 2]| {
-        let others = others.map(|xi| Neighbour { xi, eta_over_r: 0.25 });
-        value(law.demand(reference, &Own { xi: own, eta: 0.5, r: 2.0 }, &others))
+        let others = others.map(|xi| Neighbour { xi, scalar: 0.25, ..Neighbour::default() });
+        value(law.demand(reference, &Own { xi: own, eta: 0.5, r: 2.0, ..Own::default() }, &others))
     };
     for shift in [0.0, -64.0, 1024.0] {
         assert_eq!(demand(2.0 + shift, [1.0 + shift, 1.5 + shift]), demand(2.0, [1.0, 1.5]));
     }
     assert!(demand(2.0, [1.0, 1.5]) < demand(2.0, [2.0, 2.0]), "ahead slows down");
     assert!(demand(1.0, [1.25, 1.5]) > demand(1.0, [1.0, 1.0]), "behind hurries");
-    let strange = [Neighbour { xi: f64::NAN, eta_over_r: f64::NAN }];
-    assert!(value(law.demand(reference, &Own { xi: 0.0, eta: 0.0, r: 0.0 }, &strange)).is_finite());
+    let strange = [Neighbour { xi: f64::NAN, scalar: f64::NAN, ..Neighbour::default() }];
+    assert!(value(law.demand(reference, &Own { xi: 0.0, eta: 0.0, r: 0.0, ..Own::default() }, &strange)).is_finite());
 }

@@ -31,8 +31,8 @@ pub struct SpeedReference {
     pub v_l_dot: f64,
 }
 
-/// What a law knows of its own vehicle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a law knows of its own vehicle. What a kind of vehicle does not have is zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Own {
     /// Coordination state with the pattern removed, ξ_i − h_i.
     #[doc(alias = "γ")]
@@ -42,15 +42,31 @@ pub struct Own {
     pub eta: f64,
     /// R_i(ξ_i) = ds/dξ \[m per unit of ξ\].
     pub r: f64,
+    /// Forward speed v_i \[m/s\]; zero for vehicles that take a rate.
+    pub v: f64,
+    /// dR_i/dt along the path \[m per unit of ξ and s\].
+    pub r_dot: f64,
+    /// First derivative of the pattern h_i in time \[units of ξ per s\].
+    pub h_dot: f64,
+    /// Second derivative of the pattern h_i in time \[units of ξ per s²\].
+    pub h_ddot: f64,
+    /// α_2 of (4.52), by which coordination excites path following; zero but for Theorem 4.7.
+    pub alpha_2: f64,
 }
 
 /// What a law knows of one neighbour in N_i.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Neighbour {
-    /// The neighbour's coordination state with its pattern removed, as last heard.
+    /// Its index in the mission.
+    pub vehicle: usize,
+    /// What stands for its coordination state with its pattern removed: as last heard, or advanced from there.
     pub xi: f64,
-    /// The neighbour's normalised speed-tracking error η_j / R_j; zero if the law does not ask for it.
-    pub eta_over_r: f64,
+    /// The one more scalar that it sent, as its law's [`VehicleLaw::says`] gave it; zero if the law sends none.
+    pub scalar: f64,
+    /// Its coordination state as it said it.
+    pub said: f64,
+    /// How long ago it said so \[s\].
+    pub age: f64,
 }
 
 /// What coordination asks of a vehicle.
@@ -58,8 +74,11 @@ pub struct Neighbour {
 pub enum Demand {
     /// A reference rate of the virtual target v_r \[units of ξ per s\] (chapters 1 and 4).
     Rate(f64),
-    /// A reference for the derivative of the speed-tracking error u_i = dη_i/dt \[m/s²\] (chapters 2 and 3).
+    /// A reference for the derivative of the speed-tracking error u_i = dη_i/dt \[m/s²\] (chapter 3); the vehicle adds
+    /// d/dt(R_i v_L).
     Acceleration(f64),
+    /// The forward acceleration dv_i/dt = F_i/m itself \[m/s²\] (chapter 2, and vehicles that are not told v_L).
+    Forward(f64),
 }
 
 /// Which kind of demand a law gives or a vehicle takes.
@@ -67,11 +86,11 @@ pub enum Demand {
 pub enum DemandKind {
     /// See [`Demand::Rate`].
     Rate,
-    /// See [`Demand::Acceleration`].
+    /// See [`Demand::Acceleration`] and [`Demand::Forward`].
     Acceleration,
 }
 
-/// A coordination law of one vehicle.
+/// A coordination law without states of its own, the same for every vehicle.
 pub trait CoordinationLaw: Send + Sync + std::fmt::Debug {
     /// The demand given what is known now; `neighbours` is N_i, possibly empty.
     fn demand(&self, reference: SpeedReference, own: &Own, neighbours: &[Neighbour]) -> Demand;
@@ -80,6 +99,61 @@ pub trait CoordinationLaw: Send + Sync + std::fmt::Debug {
     /// Whether neighbours must send η_j / R_j beside ξ_j.
     fn needs_speed_error(&self) -> bool {
         false
+    }
+}
+
+/// The coordination law of a fleet, as a mission chooses it: makes each vehicle's law.
+///
+/// Every [`CoordinationLaw`] is one. Laws with states, or in which vehicles have different parts, implement it themselves.
+pub trait FleetLaw: Send + Sync + std::fmt::Debug {
+    /// The kind of demand it gives.
+    fn kind(&self) -> DemandKind;
+    /// What is sent beside ξ, in words and with its unit; `None` if ξ is all.
+    fn says(&self) -> Option<&'static str>;
+    /// The law of the vehicle with this index in the mission.
+    fn vehicle(&self, index: usize) -> Box<dyn VehicleLaw>;
+}
+
+/// The coordination law of one vehicle, with its states.
+pub trait VehicleLaw: Send + std::fmt::Debug {
+    /// The demand for the coming control period, given what is known at its begin.
+    fn demand(&mut self, reference: SpeedReference, own: &Own, neighbours: &[Neighbour]) -> Demand;
+    /// Moves the law's own states over a control period of `dt` seconds, with what it knew at its begin held.
+    fn advance(&mut self, dt: f64) {
+        let _ = dt;
+    }
+    /// The one more scalar that goes on the air beside ξ. Always `Some` if [`FleetLaw::says`] is, else always `None`.
+    fn says(&self, own: &Own) -> Option<f64> {
+        let _ = own;
+        None
+    }
+}
+
+impl<L: CoordinationLaw + Clone + 'static> FleetLaw for L {
+    fn kind(&self) -> DemandKind {
+        CoordinationLaw::kind(self)
+    }
+
+    fn says(&self) -> Option<&'static str> {
+        self.needs_speed_error().then_some("normalised speed-tracking error η/R [units of ξ per s]")
+    }
+
+    fn vehicle(&self, _index: usize) -> Box<dyn VehicleLaw> {
+        Box::new(Stateless(self.clone()))
+    }
+}
+
+/// A law without states as the law of one vehicle.
+#[derive(Debug)]
+struct Stateless<L>(L);
+
+impl<L: CoordinationLaw> VehicleLaw for Stateless<L> {
+    fn demand(&mut self, reference: SpeedReference, own: &Own, neighbours: &[Neighbour]) -> Demand {
+        self.0.demand(reference, own, neighbours)
+    }
+
+    fn says(&self, own: &Own) -> Option<f64> {
+        self.0.needs_speed_error().then_some(own.eta / own.r)
     }
 }
 

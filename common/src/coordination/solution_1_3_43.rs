@@ -46,10 +46,13 @@ mod tests {
 
     #[test]
     fn the_row_of_the_law_by_hand() {
-        let neighbours = [Neighbour { xi: 1.0, eta_over_r: 0.5 }, Neighbour { xi: 2.5, eta_over_r: -0.25 }];
+        let neighbours = [
+            Neighbour { xi: 1.0, scalar: 0.5, ..Neighbour::default() },
+            Neighbour { xi: 2.5, scalar: -0.25, ..Neighbour::default() },
+        ];
         let u = SolutionOne::new(2.0).unwrap().demand(
             SpeedReference { v_l: 9.0, v_l_dot: 9.0 },
-            &Own { xi: 2.0, eta: 1.0, r: 4.0 },
+            &Own { xi: 2.0, eta: 1.0, r: 4.0, ..Own::default() },
             &neighbours,
         );
         // −(2 + ¼)·1 − [2·(1 − 0.5) + (0.25 − 0.5) + (0.25 + 0.25)]

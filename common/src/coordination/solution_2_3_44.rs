@@ -43,8 +43,11 @@ mod tests {
 
     #[test]
     fn the_row_of_the_law_by_hand() {
-        let neighbours = [Neighbour { xi: 1.0, eta_over_r: 7.0 }, Neighbour { xi: 2.5, eta_over_r: 7.0 }];
-        let own = Own { xi: 2.0, eta: 1.0, r: 4.0 };
+        let neighbours = [
+            Neighbour { xi: 1.0, scalar: 7.0, ..Neighbour::default() },
+            Neighbour { xi: 2.5, scalar: 7.0, ..Neighbour::default() },
+        ];
+        let own = Own { xi: 2.0, eta: 1.0, r: 4.0, ..Own::default() };
         let u = SolutionTwo::new(2.0, 3.0).unwrap().demand(SpeedReference::default(), &own, &neighbours);
         assert_eq!(u, Demand::Acceleration(-2.0 - 3.0 / 4.0 * 0.5));
     }

@@ -61,8 +61,11 @@ mod tests {
 
     #[test]
     fn the_row_of_the_law_by_hand() {
-        let neighbours = [Neighbour { xi: 1.0, eta_over_r: 0.5 }, Neighbour { xi: 2.5, eta_over_r: -0.25 }];
-        let own = Own { xi: 2.0, eta: 1.0, r: 4.0 };
+        let neighbours = [
+            Neighbour { xi: 1.0, scalar: 0.5, ..Neighbour::default() },
+            Neighbour { xi: 2.5, scalar: -0.25, ..Neighbour::default() },
+        ];
+        let own = Own { xi: 2.0, eta: 1.0, r: 4.0, ..Own::default() };
         let law = |x_m| SolutionThree::new(2.0, 3.0, x_m).unwrap();
         // −2/4·1 − ½·(−0.25 + 0.5) − 3·sat(1 + ½·0.5)
         let u = law(10.0).demand(SpeedReference::default(), &own, &neighbours);
@@ -84,8 +87,8 @@ mod tests {
         #[test]
         fn from_rest_the_demand_is_bounded(xi in -1e9..1e9f64, other in -1e9..1e9f64, r in 0.1..10.0f64) {
             let law = SolutionThree::new(1.0, 0.25, 1.0).unwrap();
-            let neighbours = [Neighbour { xi: other, eta_over_r: 0.0 }];
-            let demand = law.demand(SpeedReference::default(), &Own { xi, eta: 0.0, r }, &neighbours);
+            let neighbours = [Neighbour { xi: other, scalar: 0.0, ..Neighbour::default() }];
+            let demand = law.demand(SpeedReference::default(), &Own { xi, eta: 0.0, r, ..Own::default() }, &neighbours);
             let Demand::Acceleration(u) = demand else { unreachable!() };
             prop_assert!(u.abs() <= 0.25 && u * (xi - other) <= 0.0);
         }

@@ -102,7 +102,7 @@ impl Craft for AuvCraft {
     }
 
     fn own(&self, _reference: SpeedReference) -> Own {
-        Own { xi: self.gamma, eta: 0.0, r: self.target.d1.norm() }
+        Own { xi: self.gamma, eta: 0.0, r: self.target.d1.norm(), ..Own::default() }
     }
 
     fn command(&mut self, reference: SpeedReference, demand: Demand) {

@@ -65,7 +65,7 @@ impl Craft for KinematicCraft {
     }
 
     fn own(&self, _: SpeedReference) -> Own {
-        Own { xi: self.xi(), eta: 0.0, r: self.origin.r() }
+        Own { xi: self.xi(), eta: 0.0, r: self.origin.r(), ..Own::default() }
     }
 
     /// v = R v_r, and the heading of (1.4).
@@ -138,7 +138,7 @@ mod tests {
             let t = 0.02 * step as f64;
             let own = [fleet[0].own(REFERENCE), fleet[1].own(REFERENCE)];
             for i in 0..2 {
-                let other = [Neighbour { xi: own[1 - i].xi, eta_over_r: 0.0 }];
+                let other = [Neighbour { xi: own[1 - i].xi, scalar: 0.0, ..Neighbour::default() }];
                 let heard = if hears(i, t) { &other[..] } else { &[] };
                 fleet[i].command(REFERENCE, law.demand(REFERENCE, &own[i], heard));
                 fleet[i].advance(0.02, 1);

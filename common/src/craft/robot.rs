@@ -41,6 +41,7 @@ impl SpeedLoop {
             (SpeedLoop::Acceleration, Demand::Acceleration(u)) => {
                 Some(Answer { v_dot: u + r_dot * v_l + r * v_l_dot, wanted: r * v_l, v_ref: v_l })
             }
+            (SpeedLoop::Acceleration, Demand::Forward(v_dot)) => Some(Answer { v_dot, wanted: r * v_l, v_ref: v_l }),
             // F/m = d/dt(R v_r) − k₀ (v − R v_r); the derivative of v_r itself is not known and left out.
             (SpeedLoop::Rate { k_0 }, Demand::Rate(v_r)) => {
                 Some(Answer { v_dot: r_dot * v_r - k_0 * (v - r * v_r), wanted: r * v_r, v_ref: v_r })
@@ -131,7 +132,9 @@ impl Craft for RobotCraft {
             SpeedLoop::Acceleration => self.state.speed - r * reference.v_l,
             SpeedLoop::Rate { .. } => 0.0,
         };
-        Own { xi: self.xi, eta, r }
+        let xi_rate = self.law.target_speed(&self.errors(), self.state.speed) / r;
+        let r_dot = self.target.dr_dxi() * xi_rate;
+        Own { xi: self.xi, eta, r, v: self.state.speed, r_dot, ..Own::default() }
     }
 
     fn command(&mut self, reference: SpeedReference, demand: Demand) {
@@ -237,8 +240,10 @@ mod tests {
         for _ in 0..(seconds / period).round() as usize {
             let own = fleet.each_ref().map(|craft| craft.own(REFERENCE));
             for (i, craft) in fleet.iter_mut().enumerate() {
-                let heard: Vec<_> =
-                    hears[i].iter().map(|&j| Neighbour { xi: own[j].xi, eta_over_r: own[j].eta / own[j].r }).collect();
+                let heard: Vec<_> = hears[i]
+                    .iter()
+                    .map(|&j| Neighbour { xi: own[j].xi, scalar: own[j].eta / own[j].r, ..Neighbour::default() })
+                    .collect();
                 craft.command(REFERENCE, law.demand(REFERENCE, &own[i], &heard));
                 craft.advance(period, 2);
                 assert!(craft.is_sound());

@@ -17,7 +17,7 @@ pub use read::read;
 pub use shape::schema;
 pub use speed::SpeedProfile;
 
-use crate::coordination::CoordinationLaw;
+use crate::coordination::FleetLaw;
 use crate::craft::Craft;
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
@@ -50,7 +50,7 @@ pub struct Mission {
     /// Formation speed over time.
     pub speed: SpeedProfile,
     /// The coordination law.
-    pub law: Arc<dyn CoordinationLaw>,
+    pub law: Arc<dyn FleetLaw>,
     /// Which law, with its gains, as written.
     pub law_choice: file::LawChoice,
     /// A neighbour leaves N_i after this silence.
@@ -205,7 +205,7 @@ impl Mission {
             seq: 0,
             made: Time::ZERO,
             xi: 0.0,
-            eta_over_r: self.law.needs_speed_error().then_some(0.0),
+            scalar: self.law.says().map(|_| 0.0),
         };
         state.encode().len()
     }

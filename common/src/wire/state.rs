@@ -27,7 +27,7 @@ pub struct CoordinationState {
     pub xi: f64,
     /// Normalised speed-tracking error η/R, sent only when the mission's law asks for it.
     #[doc(alias = "η")]
-    pub eta_over_r: Option<f64>,
+    pub scalar: Option<f64>,
 }
 
 type StateCodec = Configuration<LittleEndian, Fixint, Limit<STATE_LIMIT>>;
@@ -60,7 +60,7 @@ impl CoordinationState {
         if used != body.len() {
             return Err(Garbage::Malformed);
         }
-        if !state.xi.is_finite() || state.eta_over_r.is_some_and(|eta| !eta.is_finite()) {
+        if !state.xi.is_finite() || state.scalar.is_some_and(|eta| !eta.is_finite()) {
             return Err(Garbage::NotFinite);
         }
         Ok(state)
@@ -75,13 +75,13 @@ mod tests {
 
     fn any_state() -> impl Strategy<Value = CoordinationState> {
         (any::<u64>(), any::<u16>(), any::<u32>(), any::<i64>(), -1e9..1e9, proptest::option::of(-1e3..1e3)).prop_map(
-            |(mission, sender, seq, made, xi, eta_over_r)| CoordinationState {
+            |(mission, sender, seq, made, xi, scalar)| CoordinationState {
                 mission,
                 sender,
                 seq,
                 made: Time::from_nanos(made),
                 xi,
-                eta_over_r,
+                scalar,
             },
         )
     }
@@ -118,15 +118,14 @@ mod tests {
 
     #[test]
     fn a_state_is_small() {
-        let state = CoordinationState { mission: 1, sender: 2, seq: 3, made: Time::ZERO, xi: 0.5, eta_over_r: None };
+        let state = CoordinationState { mission: 1, sender: 2, seq: 3, made: Time::ZERO, xi: 0.5, scalar: None };
         assert_eq!(state.encode().len(), 35);
-        assert_eq!(CoordinationState { eta_over_r: Some(0.0), ..state }.encode().len(), 43);
+        assert_eq!(CoordinationState { scalar: Some(0.0), ..state }.encode().len(), 43);
     }
 
     #[test]
     fn a_number_that_is_not_finite_stays_off_the_air() {
-        let state =
-            CoordinationState { mission: 1, sender: 2, seq: 3, made: Time::ZERO, xi: f64::NAN, eta_over_r: None };
+        let state = CoordinationState { mission: 1, sender: 2, seq: 3, made: Time::ZERO, xi: f64::NAN, scalar: None };
         assert_eq!(CoordinationState::decode(&state.encode()), Err(Garbage::NotFinite));
     }
 }

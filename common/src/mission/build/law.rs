@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::file::LawChoice;
-use crate::coordination::CoordinationLaw;
+use crate::coordination::FleetLaw;
 use crate::coordination::delayed_4_34::Delayed;
 use crate::coordination::delayed_4_42::DelayedAlone;
 use crate::coordination::introduction_1_5::Introduction;
@@ -15,7 +15,7 @@ use crate::theory::delay::steady_speed;
 use crate::time::Span;
 
 /// The coordination law of a choice.
-pub(in crate::mission) fn law(choice: &LawChoice) -> Result<Arc<dyn CoordinationLaw>, String> {
+pub(in crate::mission) fn law(choice: &LawChoice) -> Result<Arc<dyn FleetLaw>, String> {
     Ok(match choice {
         LawChoice::Introduction(g) => Arc::new(Introduction::new(g.gain)?),
         LawChoice::Solution1(g) => Arc::new(SolutionOne::new(g.a)?),

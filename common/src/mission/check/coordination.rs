@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::super::build;
 use super::super::fault::Collector;
 use super::super::file::{Between, LawChoice, MissionFile};
-use crate::coordination::CoordinationLaw;
+use crate::coordination::FleetLaw;
 
-pub(super) fn check_law(faults: &mut Collector<'_>, file: &MissionFile) -> Option<Arc<dyn CoordinationLaw>> {
+pub(super) fn check_law(faults: &mut Collector<'_>, file: &MissionFile) -> Option<Arc<dyn FleetLaw>> {
     let key = "coordination.law";
     if let LawChoice::Introduction(_) = file.coordination.law
         && file.vehicles.len() != 2

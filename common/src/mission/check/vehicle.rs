@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::super::fault::Collector;
 use super::super::file::{FollowingChoice, MissionFile, ModelChoice, PathChoice, SegmentChoice, VehicleSection};
 use super::super::{Start, VehiclePlan, build};
-use crate::coordination::{CoordinationLaw, DemandKind};
+use crate::coordination::{DemandKind, FleetLaw};
 use crate::path::Path;
 use crate::path::closest::closest_parameter;
 
@@ -13,7 +13,7 @@ pub(super) fn check_vehicle(
     faults: &mut Collector<'_>,
     file: &MissionFile,
     index: usize,
-    law: Option<&dyn CoordinationLaw>,
+    law: Option<&dyn FleetLaw>,
     factor: f64,
     fastest: f64,
 ) -> Option<VehiclePlan> {
@@ -93,7 +93,7 @@ fn check_fit(
     file: &MissionFile,
     model: &ModelChoice,
     following: &FollowingChoice,
-    law: Option<&dyn CoordinationLaw>,
+    law: Option<&dyn FleetLaw>,
     path: &dyn Path,
 ) -> bool {
     let (fits, law_of_model) = match (model, following) {
