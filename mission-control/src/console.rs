@@ -88,7 +88,12 @@ impl Count {
 
     /// One more is done.
     pub fn one_more(&mut self, message: &str) {
-        self.reached += 1;
+        self.reach(self.reached + 1, message);
+    }
+
+    /// So many are done.
+    pub fn reach(&mut self, count: usize, message: &str) {
+        self.reached = count;
         match &self.bar {
             Some(bar) => {
                 bar.set_position(self.reached as u64);

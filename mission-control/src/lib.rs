@@ -2,7 +2,7 @@
 //!
 //! [`conduct`] is a flight as a pure machine; [`simulate`] connects the machines of a whole fleet in one thread; [`run`]
 //! conducts a fleet of processes; [`results`] is everything that happens to what was recorded; [`gallery`] shows many flights on
-//! one page.
+//! one page, [`sweep`] varies one.
 
 pub mod batch;
 pub mod cli;
@@ -16,4 +16,5 @@ pub mod rehearse;
 pub mod results;
 pub mod run;
 pub mod simulate;
+pub mod sweep;
 pub mod theory;
