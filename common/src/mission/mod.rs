@@ -5,6 +5,7 @@ mod check;
 mod fault;
 pub mod file;
 mod pattern;
+mod read;
 mod shape;
 mod speed;
 
@@ -12,8 +13,9 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-pub use fault::{Fault, Faults};
+pub use fault::{Collector, Fault, Faults};
 pub use pattern::{Pattern, PatternMotion, PatternPoint};
+pub use read::read;
 pub use shape::schema;
 pub use speed::SpeedProfile;
 
