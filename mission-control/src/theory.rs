@@ -3,8 +3,8 @@
 use common::graph::Graph;
 use common::graph::measure::Connectivity;
 use common::graph::spectrum;
+use common::mission::Mission;
 use common::mission::file::{FollowingChoice, FollowingType, LawChoice};
-use common::mission::{Delay, Mission};
 use common::theory::delay::{self, DelayGains};
 use common::theory::theorem_4_4::Coordination;
 use common::theory::{Gains, theorem_4_5};
@@ -64,7 +64,7 @@ impl Network {
             planned: Connectivity::planned(mission.switching.clone(), n, &arcs, mission.end),
             graphs,
             up,
-            immediate: mission.links.iter().all(|l| l.delay == Delay::Constant(Span::ZERO) && l.loss == 0.0),
+            immediate: mission.every_message_takes(Span::ZERO) && mission.loses_by_switching_only(),
         }
     }
 
@@ -198,7 +198,7 @@ fn law_rows(mission: &Mission, network: &Network, summary: Option<&Summary>) -> 
             let in_mean = network.planned.connected_in_mean().is_some();
             let verdict = delay::verdict(DelayGains::Averaged(law.gain), tau, v_l, in_mean);
             let always_heard = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_)) || never_alone(network);
-            let told = mission.links.iter().all(|link| told_truly(link.delay, law.delay_s) && link.loss == 0.0);
+            let told = told_truly(mission, law.delay_s) && mission.loses_by_switching_only();
             row.name = verdict.name.into();
             row.condition = match mission.law_choice {
                 LawChoice::Delayed(_) => {
@@ -252,9 +252,9 @@ fn never_alone(network: &Network) -> bool {
     network.graphs.iter().all(|graph| (0..graph.len()).all(|i| graph.degree(i) > 0))
 }
 
-/// Whether the law was told the delay that the link has.
-fn told_truly(delay: Delay, tau: f64) -> bool {
-    delay == Delay::Constant(Span::from_secs(tau))
+/// Whether the law was told the delay that the network has.
+fn told_truly(mission: &Mission, tau: f64) -> bool {
+    mission.every_message_takes(Span::from_secs(tau))
 }
 
 fn speed_row(mission: &Mission, summary: Option<&Summary>) -> TheoryRow {
@@ -266,7 +266,7 @@ fn speed_row(mission: &Mission, summary: Option<&Summary>) -> TheoryRow {
     TheoryRow {
         name: name.into(),
         condition,
-        holds: mission.law_delay().map(|tau| mission.links.iter().all(|link| told_truly(link.delay, tau))),
+        holds: mission.law_delay().map(|tau| told_truly(mission, tau)),
         predicted: format!("{:.5} 1/s", mission.nominal_factor() * v_l),
         measured: measured(summary, |s| format!("{:.5} 1/s", s.fleet.steady_speed)),
     }

@@ -24,6 +24,13 @@ pub enum Delay {
     },
 }
 
+impl Default for Delay {
+    /// None.
+    fn default() -> Delay {
+        Delay::Constant(Span::ZERO)
+    }
+}
+
 impl Delay {
     /// Normal with this mean and standard deviation \[s\], cut off below `least` ≥ 0.
     pub fn normal(mean: f64, deviation: f64, least: f64) -> Delay {
@@ -107,7 +114,10 @@ mod tests {
             // Five standard deviations of the mean of n draws; the deviation's own is below 1.5/√n of it for these.
             let root = (n as f64).sqrt();
             assert!((found_mean - mean).abs() <= 5.0 * deviation / root + 1e-9, "{delay:?}: mean {found_mean}");
-            assert!((found_deviation - deviation).abs() <= 7.5 * deviation / root + 1e-9, "deviation {found_deviation}");
+            assert!(
+                (found_deviation - deviation).abs() <= 7.5 * deviation / root + 1e-9,
+                "deviation {found_deviation}"
+            );
         }
     }
 

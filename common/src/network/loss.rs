@@ -64,9 +64,7 @@ impl Loss {
     pub fn mean(&self) -> f64 {
         match self {
             Loss::Bernoulli(probability) => *probability,
-            Loss::Bursts { states, in_burst, in_gap } => {
-                states.share() * in_burst + (1.0 - states.share()) * in_gap
-            }
+            Loss::Bursts { states, in_burst, in_gap } => states.share() * in_burst + (1.0 - states.share()) * in_gap,
             Loss::SharedFades { common, .. } => common.share(),
             Loss::Trace(lost) => lost.iter().filter(|lost| **lost).count() as f64 / lost.len().max(1) as f64,
         }

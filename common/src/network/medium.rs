@@ -119,7 +119,16 @@ mod tests {
 
     fn medium(slots: Option<Slots>) -> Medium {
         let (when_full, backoff) = (WhenFull::DropNew, Span::ZERO);
-        Medium { airtime: s(2.0), queue: 1, when_full, backoff, half_duplex: true, collisions: true, slots, duty_cycle: 1.0 }
+        Medium {
+            airtime: s(2.0),
+            queue: 1,
+            when_full,
+            backoff,
+            half_duplex: true,
+            collisions: true,
+            slots,
+            duty_cycle: 1.0,
+        }
     }
 
     #[test]
@@ -131,14 +140,9 @@ mod tests {
     #[test]
     fn a_vehicle_speaks_in_its_own_slot_and_ends_before_the_guard_time() {
         let medium = medium(Some(Slots::new(s(15.0), s(3.0), &[0, 1, 2], 3)));
-        for (vehicle, earliest, start) in [
-            (0, 0.0, 0.0),
-            (0, 9.9, 9.9),
-            (0, 10.1, 45.0),
-            (1, 0.0, 15.0),
-            (1, 44.0, 60.0),
-            (2, 44.9, 75.0),
-        ] {
+        for (vehicle, earliest, start) in
+            [(0, 0.0, 0.0), (0, 9.9, 9.9), (0, 10.1, 45.0), (1, 0.0, 15.0), (1, 44.0, 60.0), (2, 44.9, 75.0)]
+        {
             assert_eq!(medium.start(vehicle, at(earliest)), at(start), "vehicle {vehicle} from {earliest} s");
         }
     }

@@ -89,7 +89,9 @@ mod tests {
     #[test]
     fn a_normal_variable_has_its_known_quantiles() {
         let normal = Quantiles::normal(0.0, 1.0, f64::NEG_INFINITY);
-        for (u, z) in [(0.5, 0.0), (0.841_344_746, 1.0), (0.977_249_868, 2.0), (0.998_650_102, 3.0), (0.025, -1.959_964)] {
+        for (u, z) in
+            [(0.5, 0.0), (0.841_344_746, 1.0), (0.977_249_868, 2.0), (0.998_650_102, 3.0), (0.025, -1.959_964)]
+        {
             assert!((normal.at(u) - z).abs() < 1e-4, "{u}: {} for {z}", normal.at(u));
         }
     }

@@ -55,7 +55,9 @@ mod tests {
     #[test]
     fn a_curve_is_linear_between_its_points_and_ends_with_the_last() {
         let curve = Range::Curve([(100.0, 1.0), (300.0, 0.5), (400.0, 0.1)].into());
-        for (distance, probability) in [(0.0, 1.0), (100.0, 1.0), (200.0, 0.75), (300.0, 0.5), (350.0, 0.3), (400.0, 0.1)] {
+        for (distance, probability) in
+            [(0.0, 1.0), (100.0, 1.0), (200.0, 0.75), (300.0, 0.5), (350.0, 0.3), (400.0, 0.1)]
+        {
             assert!((curve.success(distance) - probability).abs() < 1e-12, "at {distance} m");
         }
         assert_eq!([400.1, f64::INFINITY, f64::NAN].map(|d| curve.success(d)), [0.0; 3]);

@@ -97,7 +97,8 @@ mod tests {
     #[test]
     fn bursts_and_gaps_last_as_long_as_told_in_the_mean() {
         for (burst, gap) in [(4.0, 16.0), (1.5, 3.0), (20.0, 20.0)] {
-            let (found_burst, found_gap, bursts) = mean_lengths(&states(&mut TwoStates::new(burst, gap), 3, 0..200_000));
+            let (found_burst, found_gap, bursts) =
+                mean_lengths(&states(&mut TwoStates::new(burst, gap), 3, 0..200_000));
             // Lengths are geometric: standard deviation √(mean (mean − 1)) each.
             for (found, mean) in [(found_burst, burst), (found_gap, gap)] {
                 let bound = 5.0 * (mean * (mean - 1.0_f64)).sqrt() / bursts.sqrt();

@@ -89,7 +89,7 @@ impl<W: Write> Exporter<W> {
                 &row.from,
                 &row.to,
                 row.seq,
-                fate(row.fate),
+                row.fate.as_str(),
             ))?,
             Record::Topology(row) => self.topology.serialize((seconds(row.t_ns), &row.from, &row.to, row.up))?,
             Record::Speed(_) => {}
@@ -124,17 +124,6 @@ pub(super) fn seconds(nanos: i64) -> String {
     let digits = format!("{rest:09}");
     let digits = digits.trim_end_matches('0');
     format!("{sign}{whole}.{}", if digits.is_empty() { "0" } else { digits })
-}
-
-/// The name of a fate, the same as in the recording.
-pub(super) fn fate(fate: Fate) -> &'static str {
-    match fate {
-        Fate::Delivered => "delivered",
-        Fate::Lost => "lost",
-        Fate::LinkDown => "link_down",
-        Fate::QueueFull => "queue_full",
-        Fate::InFlight => "in_flight",
-    }
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ mod statistics;
 mod summary;
 #[cfg(test)]
 mod testing;
+mod trace;
 
 pub use diff::{Outcome, Side, diff, origins_differ};
 pub use export::{Exporter, export_csv};
@@ -35,3 +36,4 @@ pub use summary::{
     ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
     Summary, VehicleSummary, summarise, summarise_clock,
 };
+pub use trace::network_section;

@@ -102,7 +102,10 @@ mod tests {
             assert!((found - mean).abs() < 5.0 * mean / n.sqrt(), "{found} for {mean}");
             let beyond = times.iter().filter(|time| **time > 2.0 * mean).count() as f64 / n;
             let share = (-2.0_f64).exp();
-            assert!((beyond - share).abs() < 5.0 * (share * (1.0 - share) / n).sqrt() + 1e-3, "{beyond} beyond two means");
+            assert!(
+                (beyond - share).abs() < 5.0 * (share * (1.0 - share) / n).sqrt() + 1e-3,
+                "{beyond} beyond two means"
+            );
         }
     }
 

@@ -139,9 +139,9 @@ impl Switching {
                 Signal::RoundRobin(turns) => turns.is_up(link, t),
                 Signal::Markov(walks) => walks.is_up(link, t),
                 Signal::InMean(turns) => turns.is_up(link, t),
-                Signal::All(parts) => parts.iter_mut().all(|part| {
-                    part.counts.as_ref().is_some_and(|counts| !counts[link]) || part.signal.is_up(link, t)
-                }),
+                Signal::All(parts) => parts
+                    .iter_mut()
+                    .all(|part| part.counts.as_ref().is_some_and(|counts| !counts[link]) || part.signal.is_up(link, t)),
             }
     }
 

@@ -10,14 +10,14 @@ use std::collections::HashMap;
 use toml::de::DeTable;
 
 use self::coordination::check_law;
-use self::network::{check_links, check_switching};
+use self::network::{check_links, check_medium, check_switching, with_preset};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
 use super::build;
 use super::fault::{Collector, Faults};
 use super::file::{MissionFile, VehicleSection};
 use super::shape::check_shape;
-use super::{Mission, SpeedProfile, VehiclePlan, digest};
+use super::{Mission, SpeedProfile, VehiclePlan, digest, message_bytes};
 use crate::time::Span;
 
 /// Most vehicles in a mission.
@@ -63,8 +63,11 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let speed = check_formation(faults, file);
     let law = check_law(faults, file);
     let ids = check_ids(faults, &file.vehicles);
-    let links = check_links(faults, file, &ids);
-    let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    let network = with_preset(&file.network);
+    let links = check_links(faults, file, &network, &ids);
+    let switching = check_switching(faults, file, &network, &ids, links.as_deref().unwrap_or(&[]));
+    let bytes = law.as_deref().map_or(0, message_bytes);
+    let medium = check_medium(faults, file, &network, &ids, bytes);
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = build::nominal_factor(&file.coordination.law);
     let vehicles: Vec<Option<VehiclePlan>> =
@@ -90,6 +93,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         links,
         switching,
         queue: file.network.queue as usize,
+        medium,
     };
     Some(mission)
 }
