@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use common::record::{Fate, Record};
+use common::record::Record;
 
 /// Writes the tables of a recording into a folder, row by row.
 pub struct Exporter<W: Write> {
@@ -130,7 +130,7 @@ pub(super) fn seconds(nanos: i64) -> String {
 mod tests {
     use super::*;
     use crate::results::testing::{fleet, state_row};
-    use common::record::{MessageRow, TopologyRow};
+    use common::record::{Fate, MessageRow, TopologyRow};
 
     fn exported(rows: &[Record]) -> [String; 3] {
         let mut exporter = Exporter::new(Vec::new(), Vec::new(), Vec::new()).expect("starts");

@@ -394,6 +394,28 @@ mod tests {
     }
 
     #[test]
+    fn each_cause_is_counted_and_copies_were_sent_by_nobody() {
+        let mut rows: Vec<Record> =
+            Fate::DROPS.into_iter().zip(0..).map(|(fate, seq)| message(seq, seq as i64, fate)).collect();
+        for fate in [Fate::Copied, Fate::CopyDropped, Fate::CopyInFlight] {
+            rows.push(message(3, 3, fate));
+        }
+        let link = link_1_2(&rows);
+        let causes = [
+            link.lost,
+            link.out_of_range,
+            link.link_down,
+            link.queue_full,
+            link.half_duplex,
+            link.collision,
+            link.corrupt,
+        ];
+        assert_eq!(causes, [1; 7]);
+        assert_eq!((link.copied, link.copy_dropped, link.copy_in_flight), (1, 1, 1));
+        assert_eq!((link.sent, link.delivered, link.repeated, link.balanced), (7, 0, 0, true));
+    }
+
+    #[test]
     fn a_message_without_a_fate_or_with_two_unbalances_the_ledger() {
         let gap = link_1_2(&[message(0, 0, Fate::Delivered), message(2, 2, Fate::Delivered)]);
         assert_eq!((gap.missing, gap.balanced), (1, false));
