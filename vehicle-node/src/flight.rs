@@ -196,16 +196,18 @@ impl Flight {
     /// One control period: neighbours, coordination, path following, message, record.
     fn control(&mut self, t: Time, tick: i64) {
         let reference = self.speed.at(t);
-        let plan = &self.mission.vehicles[self.me];
+        let pattern = self.mission.vehicles[self.me].pattern.at(t);
+        let law = &self.law;
         if self.rejoining
-            && let Some(xi) = self.neighbours.formation_xi(t, reference.v_l)
+            && let Some(xi) = self.neighbours.formation_xi(t, |scalar| law.neighbour_rate(reference, scalar))
         {
-            self.craft.place_target(xi + plan.pattern);
+            self.craft.place_target(xi + pattern.h);
             self.rejoining = false;
         }
         let mut own = self.craft.own(reference);
-        own.xi -= plan.pattern;
-        let present = self.neighbours.present(t, reference.v_l);
+        own.xi -= pattern.h;
+        (own.h_dot, own.h_ddot) = (pattern.h_dot, pattern.h_ddot);
+        let present = self.neighbours.present(t, |scalar| law.neighbour_rate(reference, scalar));
         let demand = self.law.demand(reference, &own, present);
         let heard = present.len() as u16;
         self.craft.command(reference, demand);

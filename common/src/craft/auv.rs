@@ -101,8 +101,10 @@ impl Craft for AuvCraft {
         DemandKind::Rate
     }
 
-    fn own(&self, _reference: SpeedReference) -> Own {
-        Own { xi: self.gamma, eta: 0.0, r: self.target.d1.norm(), ..Own::default() }
+    /// With α_2 of the present state, which does not depend on the rate that is yet to be decided.
+    fn own(&self, reference: SpeedReference) -> Own {
+        let alpha_2 = self.law.alpha_2(&self.state, &self.target, self.nominal_factor * reference.v_l);
+        Own { xi: self.gamma, eta: 0.0, r: self.target.d1.norm(), alpha_2, ..Own::default() }
     }
 
     fn command(&mut self, reference: SpeedReference, demand: Demand) {

@@ -41,7 +41,8 @@ impl SpeedLoop {
             (SpeedLoop::Acceleration, Demand::Acceleration(u)) => {
                 Some(Answer { v_dot: u + r_dot * v_l + r * v_l_dot, wanted: r * v_l, v_ref: v_l })
             }
-            (SpeedLoop::Acceleration, Demand::Forward(v_dot)) => Some(Answer { v_dot, wanted: r * v_l, v_ref: v_l }),
+            // The sense of travel of a robot that may not be told v_L is its own.
+            (SpeedLoop::Acceleration, Demand::Forward(v_dot)) => Some(Answer { v_dot, wanted: v, v_ref: v_l }),
             // F/m = d/dt(R v_r) − k₀ (v − R v_r); the derivative of v_r itself is not known and left out.
             (SpeedLoop::Rate { k_0 }, Demand::Rate(v_r)) => {
                 Some(Answer { v_dot: r_dot * v_r - k_0 * (v - r * v_r), wanted: r * v_r, v_ref: v_r })

@@ -5,6 +5,7 @@ mod check;
 mod fault;
 pub mod file;
 mod link;
+mod pattern;
 mod shape;
 mod speed;
 
@@ -14,6 +15,7 @@ use sha2::{Digest, Sha256};
 
 pub use fault::{Fault, Faults};
 pub use link::{Layer, Link};
+pub use pattern::{Pattern, PatternMotion, PatternPoint};
 pub use shape::schema;
 pub use speed::SpeedProfile;
 
@@ -75,8 +77,8 @@ pub struct Mission {
 pub struct VehiclePlan {
     /// Its name.
     pub id: String,
-    /// Its place in the pattern, h_i.
-    pub pattern: f64,
+    /// Its place in the pattern, h_i(t).
+    pub pattern: Pattern,
     /// Its path.
     pub path: Arc<dyn Path>,
     /// Where it starts.
@@ -177,6 +179,23 @@ impl Mission {
             }
             _ => None,
         }
+    }
+
+    /// The rate at which α_2 lets the fleet travel in the end under (4.59), where it is fed back and does not vanish
+    /// (erratum 4.14): v_L less what δ costs, for vehicles with the gains of the first. At rest z = (Lγ + α_2)/(a_1 + a_2), so
+    /// η = −α_2 a_2/(a_1(a_1 + a_2)): that of type I with k_η = a_1(a_1 + a_2)/a_2.
+    pub fn excited_speed(&self) -> Option<f64> {
+        let file::LawChoice::Auxiliary(law) = &self.law_choice else { return None };
+        let plan = self.vehicles.first()?;
+        let (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) =
+            (&plan.model, &plan.following)
+        else {
+            return None;
+        };
+        let mut gains = build::auv_gains(gains);
+        gains.k_eta = law.a1 * (law.a1 + law.a2) / law.a2;
+        let (v_l, stretch) = (self.speed.at(self.end).v_l, plan.path.at(plan.start.xi).r());
+        Some(gains.predicted_rate_type_1(&build::auv(*model), v_l, v_l, stretch))
     }
 
     /// Whether every vehicle can fly at this formation speed.

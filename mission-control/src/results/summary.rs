@@ -1,7 +1,8 @@
 //! The numbers of a run: `summary.json`, a function of mission and seed, and `clock.json`, of the machine too.
 
 use bus::recording::Recording;
-use common::record::ClockRecord;
+use common::record::{ClockRecord, StateRow};
+use common::time::Time;
 use serde::Serialize;
 
 use super::Facts;
@@ -148,7 +149,7 @@ pub struct VehicleSummary {
     pub id: String,
     /// Its path.
     pub path: String,
-    /// Its place in the pattern.
+    /// Its place in the pattern; its mean, if it moves.
     pub pattern_offset: f64,
     /// Rows of its state.
     pub rows: u64,
@@ -344,18 +345,21 @@ fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts) -> VehicleSummar
     let peak = largest(errors.iter().copied());
     let path_settled_s = settling_time(&t_s, &errors, SETTLED_PART * peak);
     let settled_index = path_settled_s.map_or(steady_index, |settled| t_s.partition_point(|time| *time < settled));
-    let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - track.pattern_offset);
+    let h = |track: &Track<'_>, row: &StateRow| track.pattern.at(Time::from_nanos(row.t_ns)).h;
+    let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - h(track, row));
     let first = all.iter().find_map(removed);
     let planned = facts.vehicles.iter().find(|vehicle| vehicle.id == track.id);
     VehicleSummary {
         id: track.id.to_owned(),
         path: planned.map(|vehicle| vehicle.path.clone()).unwrap_or_default(),
-        pattern_offset: track.pattern_offset,
+        pattern_offset: track.pattern.constant,
         rows: rows.len() as u64,
         coordination_final: removed(track).zip(first).map_or(0.0, |(own, first)| own - first),
         steady_speed: match (steady.first(), steady.last()) {
-            // The mean rate exactly, not the mean of samples of the rate.
-            (Some(a), Some(b)) if b.t_ns > a.t_ns => (b.xi - a.xi) / ((b.t_ns - a.t_ns) as f64 / 1e9),
+            // The mean rate of ξ − h exactly, not the mean of samples of the rate.
+            (Some(a), Some(b)) if b.t_ns > a.t_ns => {
+                (b.xi - a.xi - (h(track, b) - h(track, a))) / ((b.t_ns - a.t_ns) as f64 / 1e9)
+            }
             _ => rows.last().map_or(0.0, |row| row.xi_rate),
         },
         steady_speed_mps: mean(steady.iter().map(|row| row.speed_mps)),

@@ -196,7 +196,7 @@ impl Emulator {
         }
         self.newest[sent.from] = Some(state.seq);
         if let Some(whereabouts) = &mut self.whereabouts {
-            whereabouts.said(sent.from, now, state.xi);
+            whereabouts.said(sent.from, now, state.made, state.xi);
         }
         let bytes: Arc<[u8]> = sent.bytes.as_slice().into();
         let parcel = Parcel { from: sent.from, seq: state.seq, number: self.taken[sent.from], sent: now, bytes };

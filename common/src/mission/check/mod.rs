@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use toml::de::DeTable;
 
-use self::coordination::check_law;
+use self::coordination::{check_law, check_told, check_weights};
 use self::network::{check_links, check_medium, check_switching, with_preset};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
@@ -61,10 +61,12 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     check_name(faults, "name", &file.name);
     let times = check_times(faults, file);
     let speed = check_formation(faults, file);
-    let law = check_law(faults, file);
     let ids = check_ids(faults, &file.vehicles);
+    let law = check_law(faults, file, &ids);
     let network = with_preset(&file.network);
     let links = check_links(faults, file, &network, &ids);
+    check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let switching = check_switching(faults, file, &network, &ids, links.as_deref().unwrap_or(&[]));
     let bytes = law.as_deref().map_or(0, message_bytes);
     let medium = check_medium(faults, file, &network, &ids, bytes);

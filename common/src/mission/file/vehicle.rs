@@ -26,10 +26,24 @@ pub struct VehicleSection {
     /// Its place h_i in the formation pattern: it is coordinated when xi_i - h_i agree.
     #[serde(default)]
     pub pattern: f64,
+    /// How its place moves about `pattern`, for the law moving_pattern.
+    pub pattern_motion: Option<PatternMotionSection>,
     /// Its plant, if other than the fleet's.
     pub model: Option<ModelChoice>,
     /// Its path-following law, if other than the fleet's.
     pub following: Option<FollowingChoice>,
+}
+
+/// A place in the pattern that moves: amplitude sin(2π t / period + phase) is added to it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct PatternMotionSection {
+    /// Amplitude (units of xi).
+    pub amplitude: f64,
+    /// Period (s).
+    pub period_s: f64,
+    /// Phase at the start (deg).
+    #[serde(default)]
+    pub phase_deg: f64,
 }
 
 /// Where a vehicle starts.
