@@ -304,16 +304,7 @@ impl Flight {
         self.over = true;
         if self.deadlines.is_some() {
             self.report_deadlines(now);
-            for kind in [
-                Garbage::Foreign,
-                Garbage::Oversized,
-                Garbage::Malformed,
-                Garbage::NotFinite,
-                Garbage::WrongMission,
-                Garbage::Forged,
-                Garbage::FromTheFuture,
-                Garbage::Stale,
-            ] {
+            for kind in Garbage::ALL {
                 let count = self.neighbours.garbage.of(kind);
                 if count > 0 {
                     self.note(now, format!("ignored messages: {}", kind.as_str()), count);
@@ -364,6 +355,7 @@ impl Machine for Flight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use common::wire::state::seal;
 
     const HELIX: &str = include_str!("../../missions/auv-helix.toml");
 
@@ -500,6 +492,7 @@ mod tests {
             .run(&(bytes, any::<bool>()), |(mut bytes, framed)| {
                 if framed {
                     bytes.splice(0..0, *b"CX\x01\x00");
+                    seal(&mut bytes);
                 }
                 let mut flight = Flight::new(mission.clone(), 0, None).expect("flies");
                 flight.handle(Time::ZERO, Some(FlightInput::Heard(bytes)));
