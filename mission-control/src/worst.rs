@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::graph::adversary::{Allowance, Signal, Signals};
+use common::mission::Mission;
 use common::mission::file::{
     FollowingChoice, FollowingType, IntervalSwitching, LawChoice, MissionFile, SwitchingChoice, UpInterval,
 };
-use common::mission::{Delay, Mission};
 use common::random::Stream;
 use common::record::{Record, Row};
 use common::theory::theorem_4_4::Coordination;

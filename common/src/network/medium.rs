@@ -15,8 +15,12 @@ pub enum WhenFull {
 /// The medium that all vehicles share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Medium {
-    /// How long one message is on the air, A.
-    pub airtime: Span,
+    /// Bits that a sender puts on the air per second \[bit/s\].
+    pub rate: f64,
+    /// Time on the air before the first bit of each message.
+    pub preamble: Span,
+    /// Size of every message on the air \[bytes\]; each its own if there is none.
+    pub packet: Option<usize>,
     /// Messages that may wait at one sender, at least 1.
     pub queue: usize,
     /// What happens beyond that.
@@ -82,19 +86,19 @@ impl Slots {
 }
 
 impl Medium {
-    /// A = 8 · bytes / rate + preamble.
-    pub fn airtime_of(bytes: usize, bit_rate: f64, preamble: Span) -> Span {
-        Span::from_secs(8.0 * bytes as f64 / bit_rate) + preamble
+    /// How long a message is on the air: A = 8 · bytes / rate + preamble.
+    pub fn airtime(&self, bytes: usize) -> Span {
+        Span::from_secs(8.0 * self.packet.unwrap_or(bytes) as f64 / self.rate) + self.preamble
     }
 
-    /// When a vehicle begins to send a message that could go out at `earliest`.
-    pub fn start(&self, vehicle: usize, earliest: Time) -> Time {
-        self.slots.as_ref().map_or(earliest, |slots| slots.first(vehicle, earliest, self.airtime))
+    /// When a vehicle begins to send a message of this airtime that could go out at `earliest`.
+    pub fn start(&self, vehicle: usize, earliest: Time, airtime: Span) -> Time {
+        self.slots.as_ref().map_or(earliest, |slots| slots.first(vehicle, earliest, airtime))
     }
 
     /// When a sender that began at `start` may begin again: silence of A(1/δ − 1) follows each message.
-    pub fn free_after(&self, start: Time) -> Time {
-        start + Span::from_secs(self.airtime.secs() / self.duty_cycle)
+    pub fn free_after(&self, start: Time, airtime: Span) -> Time {
+        start + Span::from_secs(airtime.secs() / self.duty_cycle)
     }
 
     /// How long a message waits at random, with its own uniform number.
