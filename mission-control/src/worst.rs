@@ -12,7 +12,7 @@ use common::mission::file::{
 use common::random::Stream;
 use common::record::{Record, Row};
 use common::theory::theorem_4_4::Coordination;
-use common::time::Span;
+use common::time::{Span, Time};
 use serde::Serialize;
 
 use crate::simulate::simulate;
@@ -110,7 +110,7 @@ fn fly(text: &str) -> Result<Errors, String> {
         if let Row::Exact(Record::State(state)) = row
             && let Some(index) = mission.index_of(&state.vehicle)
         {
-            rows[index].push(state.xi - mission.vehicles[index].pattern);
+            rows[index].push(state.xi - mission.vehicles[index].pattern.at(Time::from_nanos(state.t_ns)).h);
         }
     };
     simulate(&mission, record, |_| true)?;

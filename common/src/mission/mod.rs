@@ -20,12 +20,13 @@ pub use shape::schema;
 pub use speed::SpeedProfile;
 
 use crate::coordination::FleetLaw;
-use crate::craft::Craft;
+use crate::craft::{Craft, Limits};
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::network::Medium;
 use crate::path::Path;
 use crate::time::{Span, Time};
+use crate::vehicle::environment::{Disturbances, Environment};
 
 /// A mission that can be flown: every number is in its range and everything fits together.
 #[derive(Clone, Debug)]
@@ -87,6 +88,10 @@ pub struct VehiclePlan {
     pub model: file::ModelChoice,
     /// Its path-following law.
     pub following: file::FollowingChoice,
+    /// What its actuators give at most.
+    pub limits: Limits,
+    /// What disturbs it.
+    pub disturbances: Disturbances,
 }
 
 /// Where a vehicle starts.
@@ -100,13 +105,6 @@ pub struct Start {
     pub speed: f64,
     /// Path parameter of the virtual target.
     pub xi: f64,
-}
-
-/// Size of one coordination message of a law \[bytes\].
-fn message_bytes(law: &dyn FleetLaw) -> usize {
-    let scalar = law.says().map(|_| 0.0);
-    let (mission, sender, seq, made, xi) = (0, 0, 0, Time::ZERO, 0.0);
-    crate::wire::state::CoordinationState { mission, sender, seq, made, xi, scalar }.encode().len()
 }
 
 /// First eight bytes of the SHA-256 of a mission file.
@@ -213,7 +211,15 @@ impl Mission {
 
     /// Size of one coordination message \[bytes\].
     pub fn message_bytes(&self) -> usize {
-        message_bytes(&*self.law)
+        let scalar = self.law.says().map(|_| 0.0);
+        let (mission, sender, seq, made, xi) = (self.digest, 0, 0, Time::ZERO, 0.0);
+        crate::wire::state::CoordinationState { mission, sender, seq, made, xi, scalar }.encode().len()
+    }
+
+    /// What surrounds a vehicle during its flight; `None` where nothing disturbs it.
+    pub fn environment(&self, vehicle: usize) -> Option<Environment> {
+        let plan = &self.vehicles[vehicle];
+        Environment::new(plan.disturbances, self.seed, &plan.id)
     }
 
     /// The vehicle with its plant and its path-following law, where the mission starts it or at another place.

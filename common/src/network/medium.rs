@@ -122,23 +122,17 @@ mod tests {
     }
 
     fn medium(slots: Option<Slots>) -> Medium {
-        let (when_full, backoff) = (WhenFull::DropNew, Span::ZERO);
-        Medium {
-            airtime: s(2.0),
-            queue: 1,
-            when_full,
-            backoff,
-            half_duplex: true,
-            collisions: true,
-            slots,
-            duty_cycle: 1.0,
-        }
+        let (rate, preamble, packet) = (80.0, s(0.3), Some(17));
+        let (when_full, backoff, duty_cycle) = (WhenFull::DropNew, Span::ZERO, 1.0);
+        let (half_duplex, collisions) = (true, true);
+        Medium { rate, preamble, packet, queue: 1, when_full, backoff, half_duplex, collisions, slots, duty_cycle }
     }
 
     #[test]
     fn seventeen_bytes_at_eighty_bits_a_second_take_one_point_seven_seconds() {
-        assert_eq!(Medium::airtime_of(17, 80.0, Span::ZERO), s(1.7));
-        assert_eq!(Medium::airtime_of(17, 80.0, s(0.3)), s(2.0));
+        let medium = medium(None);
+        assert_eq!(medium.airtime(39), s(2.0), "packed, after a preamble of 0.3 s");
+        assert_eq!(Medium { packet: None, ..medium }.airtime(40), s(4.3), "as it is");
     }
 
     #[test]
@@ -147,22 +141,23 @@ mod tests {
         for (vehicle, earliest, start) in
             [(0, 0.0, 0.0), (0, 9.9, 9.9), (0, 10.1, 45.0), (1, 0.0, 15.0), (1, 44.0, 60.0), (2, 44.9, 75.0)]
         {
-            assert_eq!(medium.start(vehicle, at(earliest)), at(start), "vehicle {vehicle} from {earliest} s");
+            assert_eq!(medium.start(vehicle, at(earliest), s(2.0)), at(start), "vehicle {vehicle} from {earliest} s");
         }
     }
 
     #[test]
     fn a_slot_shorter_than_the_airtime_is_never_used() {
-        assert_eq!(medium(Some(Slots::new(s(3.0), s(1.5), &[0], 1))).start(0, at(1.0)), Time::MAX);
-        assert_eq!(medium(Some(Slots::new(s(15.0), s(1.0), &[0], 2))).start(1, at(1.0)), Time::MAX, "has no slot");
-        assert_eq!(medium(Some(Slots::new(s(15.0), s(1.0), &[], 2))).start(1, at(1.0)), Time::MAX, "no slots at all");
+        let start = |slots: Slots, vehicle: usize| medium(Some(slots)).start(vehicle, at(1.0), s(2.0));
+        assert_eq!(start(Slots::new(s(3.0), s(1.5), &[0], 1), 0), Time::MAX);
+        assert_eq!(start(Slots::new(s(15.0), s(1.0), &[0], 2), 1), Time::MAX, "has no slot");
+        assert_eq!(start(Slots::new(s(15.0), s(1.0), &[], 2), 1), Time::MAX, "no slots at all");
     }
 
     #[test]
     fn the_duty_cycle_is_kept() {
         let medium = Medium { duty_cycle: 0.1, ..medium(None) };
-        assert_eq!(medium.free_after(at(5.0)), at(25.0), "2 s on the air, 18 s of silence");
-        assert_eq!(Medium { duty_cycle: 1.0, ..medium }.free_after(at(5.0)), at(7.0));
+        assert_eq!(medium.free_after(at(5.0), s(2.0)), at(25.0), "2 s on the air, 18 s of silence");
+        assert_eq!(Medium { duty_cycle: 1.0, ..medium }.free_after(at(5.0), s(2.0)), at(7.0));
     }
 
     proptest! {
@@ -172,7 +167,8 @@ mod tests {
             earliest in 0.0..1e4f64, vehicle in 0usize..3, order in prop::collection::vec(0usize..3, 1..8),
             slot in 2.5..20.0f64, guard in 0.0..0.5f64,
         ) {
-            let start = medium(Some(Slots::new(s(slot), s(guard), &order, 3))).start(vehicle, at(earliest));
+            let medium = medium(Some(Slots::new(s(slot), s(guard), &order, 3)));
+            let start = medium.start(vehicle, at(earliest), s(2.0));
             if order.contains(&vehicle) {
                 prop_assert!(start >= at(earliest));
                 let (slot, guard) = (s(slot).nanos(), s(guard).nanos());

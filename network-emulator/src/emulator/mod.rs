@@ -28,7 +28,7 @@ use common::machine::Machine;
 use common::mission::{Link, Mission};
 use common::network::Whereabouts;
 use common::random::Stream;
-use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, Name, NoteRow, Record, Row, TopologyRow};
+use common::record::{ClockRecord, Fate, Name, NoteRow, Record, Row, Settled, TopologyRow};
 use common::time::{Span, Time};
 use common::wire::state::CoordinationState;
 use common::wire::{Garbage, GarbageCount};
@@ -45,7 +45,7 @@ pub struct Sent {
     /// Index of the vehicle whose line they came from.
     pub from: usize,
     /// The bytes.
-    pub bytes: Vec<u8>,
+    pub bytes: Arc<[u8]>,
 }
 
 /// What the channel wants done.
@@ -62,6 +62,8 @@ pub enum Channel {
     },
     /// Record this row.
     Record(Row),
+    /// Record what became of a message.
+    Settled(Settled),
 }
 
 /// The emulated network of one mission.
@@ -141,11 +143,6 @@ impl Emulator {
         self.links.iter().map(|link| &link.ledger)
     }
 
-    /// The name of a vehicle.
-    pub fn name(&self, vehicle: usize) -> &Name {
-        &self.names[vehicle]
-    }
-
     /// Sent, delivered, dropped, in flight, over all links.
     pub fn totals(&self) -> [u64; 4] {
         let add =
@@ -198,7 +195,7 @@ impl Emulator {
         if let Some(whereabouts) = &mut self.whereabouts {
             whereabouts.said(sent.from, now, state.made, state.xi);
         }
-        let bytes: Arc<[u8]> = sent.bytes.as_slice().into();
+        let bytes = Arc::clone(&sent.bytes);
         let parcel = Parcel { from: sent.from, seq: state.seq, number: self.taken[sent.from], sent: now, bytes };
         self.taken[sent.from] += 1;
         for slot in 0..self.out[sent.from].len() {
@@ -222,8 +219,8 @@ impl Emulator {
     /// A vehicle's turn has come to speak.
     fn speak(&mut self, t: Time, vehicle: usize) {
         let Some(medium) = &self.mission.medium else { return };
-        let airtime = medium.airtime;
         let Some(parcel) = self.senders[vehicle].speak(medium) else { return };
+        let airtime = medium.airtime(parcel.bytes.len());
         self.airs[vehicle].speak(medium, t, t + airtime);
         for slot in 0..self.out[vehicle].len() {
             self.transmit(&parcel, self.out[vehicle][slot], t, airtime);
@@ -265,17 +262,19 @@ impl Emulator {
     }
 
     fn record_message(&mut self, t: Time, message: &UnderWay, fate: Fate) {
-        let link = &self.links[message.link];
-        let row = MessageRow {
+        self.record_settled(t, message, fate, None);
+    }
+
+    fn record_settled(&mut self, t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i64>) {
+        self.outputs.push_back(Channel::Settled(Settled {
             t_ns: t.nanos(),
-            from: self.names[link.from].clone(),
-            to: self.names[link.to].clone(),
+            link: message.link,
             seq: message.parcel.number,
             sent_ns: message.parcel.sent.nanos(),
             due_ns: message.due.nanos(),
             fate,
-        };
-        self.outputs.push_back(Channel::Record(Row::Exact(Record::Message(row))));
+            late_ns,
+        }));
     }
 
     /// A message has come to the end of its way: it is received if the link is up at that instant (p(t) gates reception,
@@ -291,20 +290,14 @@ impl Emulator {
             (true, true) => Fate::Copied,
             (true, false) => Fate::CopyDropped,
         };
-        self.settle(message.due, &message, fate);
+        self.links[message.link].ledger.settle(fate);
+        let late_ns = self
+            .watch_delays
+            .filter(|_| fate == Fate::Delivered)
+            .map(|speed_up| ((now - message.due).nanos() as f64 / speed_up) as i64);
+        self.record_settled(message.due, &message, fate, late_ns);
         if !handed_over {
             return;
-        }
-        if let Some(speed_up) = self.watch_delays.filter(|_| fate == Fate::Delivered) {
-            let row = AchievedRow {
-                t_ns: message.due.nanos(),
-                from: self.names[message.parcel.from].clone(),
-                to: self.names[to].clone(),
-                seq: message.parcel.number,
-                commanded_ns: (message.due - message.parcel.sent).nanos(),
-                late_ns: ((now - message.due).nanos() as f64 / speed_up) as i64,
-            };
-            self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Achieved(row))));
         }
         self.outputs.push_back(Channel::Deliver { to, due: message.due, bytes: message.parcel.bytes });
     }

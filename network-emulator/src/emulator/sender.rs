@@ -49,8 +49,8 @@ impl Sender {
     /// The message that is sent now.
     pub(super) fn speak(&mut self, medium: &Medium) -> Option<Parcel> {
         let parcel = self.waiting.pop_front();
-        if let Some(start) = self.next {
-            self.free = medium.free_after(start);
+        if let (Some(start), Some(parcel)) = (self.next, &parcel) {
+            self.free = medium.free_after(start, medium.airtime(parcel.bytes.len()));
         }
         self.plan(medium);
         parcel
@@ -67,7 +67,8 @@ impl Sender {
         if let Some(parcel) = self.waiting.front() {
             let waits = if medium.backoff.nanos() > 0 { self.stream.unit_at(u64::from(parcel.seq), 0) } else { 0.0 };
             let earliest = (parcel.sent + medium.wait(waits)).max(self.free);
-            self.next = Some(medium.start(self.vehicle, earliest)).filter(|start| *start < Time::MAX);
+            self.next = Some(medium.start(self.vehicle, earliest, medium.airtime(parcel.bytes.len())))
+                .filter(|start| *start < Time::MAX);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! From the file as written to a mission that can be flown, or to everything that is wrong with it.
 
 mod coordination;
+mod environment;
 mod network;
 mod time;
 mod vehicle;
@@ -17,7 +18,7 @@ use super::build;
 use super::fault::{Collector, Faults};
 use super::file::{MissionFile, VehicleSection};
 use super::shape::check_shape;
-use super::{Mission, SpeedProfile, VehiclePlan, digest, message_bytes};
+use super::{Mission, SpeedProfile, VehiclePlan, digest};
 use crate::time::Span;
 
 /// Most vehicles in a mission.
@@ -68,8 +69,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let switching = check_switching(faults, file, &network, &ids, links.as_deref().unwrap_or(&[]));
-    let bytes = law.as_deref().map_or(0, message_bytes);
-    let medium = check_medium(faults, file, &network, &ids, bytes);
+    let medium = check_medium(faults, file, &network, &ids);
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = build::nominal_factor(&file.coordination.law);
     let vehicles: Vec<Option<VehiclePlan>> =

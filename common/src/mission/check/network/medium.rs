@@ -7,14 +7,14 @@ use super::super::super::file::{MissionFile, NetworkSection, SlotsSection, WhenF
 use crate::network::Medium;
 use crate::network::medium::{Slots, WhenFull};
 use crate::time::Span;
+use crate::wire::state::STATE_LIMIT;
 
-/// The medium of a mission whose messages have `bytes`.
+/// The medium of a mission, if it has one.
 pub(in super::super) fn check_medium(
     faults: &mut Collector<'_>,
     file: &MissionFile,
     network: &NetworkSection,
     ids: &HashMap<String, usize>,
-    bytes: usize,
 ) -> Option<Medium> {
     let section = network.medium.as_ref()?;
     let key = "network.medium";
@@ -32,11 +32,10 @@ pub(in super::super) fn check_medium(
     // Silence after a message is at most a hundred thousand times as long as the message.
     let duty_ok = (1e-5..=1.0).contains(&section.duty_cycle);
     faults.number(&format!("{key}.duty_cycle"), section.duty_cycle, duty_ok, "0.00001 to 1, a share of the time");
-    let bytes = section.packet_bytes.map_or(bytes, |bytes| bytes as usize);
-    let airtime = Medium::airtime_of(bytes, section.rate_bps, Span::from_secs(section.preamble_s));
-    let slots = section.slots.as_ref().map(|slots| check_slots(faults, file, ids, slots, airtime));
-    Some(Medium {
-        airtime,
+    let mut medium = Medium {
+        rate: section.rate_bps,
+        preamble: Span::from_secs(section.preamble_s),
+        packet: section.packet_bytes.map(|bytes| bytes as usize),
         queue: section.queue as usize,
         when_full: match section.when_full {
             WhenFullChoice::DropNew => WhenFull::DropNew,
@@ -45,9 +44,13 @@ pub(in super::super) fn check_medium(
         backoff: Span::from_secs(section.backoff_s),
         half_duplex: section.half_duplex,
         collisions: section.collisions,
-        slots,
+        slots: None,
         duty_cycle: section.duty_cycle,
-    })
+    };
+    // What fits a slot at its greatest always fits.
+    let airtime = medium.airtime(STATE_LIMIT);
+    medium.slots = section.slots.as_ref().map(|slots| check_slots(faults, file, ids, slots, airtime));
+    Some(medium)
 }
 
 fn check_slots(
@@ -91,7 +94,7 @@ fn check_slots(
     let slots = Slots::new(Span::from_secs(section.slot_s), Span::from_secs(section.guard_s), &order, n);
     if slot_ok && guard_ok && slots.usable() < airtime {
         let found = format!("{} s, less {} s of guard", section.slot_s, section.guard_s);
-        let allowed = format!("at least the airtime of a message, {} s, and the guard", airtime.secs());
+        let allowed = format!("at least the airtime of the longest message, {} s, and the guard", airtime.secs());
         faults.fault(&format!("{key}.slot_s"), found, allowed);
     }
     slots
