@@ -118,6 +118,7 @@ pub(super) fn achieved(row: &AchievedRow, json: &mut Vec<u8>) {
 
 #[cfg(test)]
 mod tests {
+    use common::record::Fate;
     use proptest::prelude::*;
 
     use super::*;
