@@ -14,7 +14,7 @@ use common::wire::vehicle::Phase;
 
 use crate::console::{Count, Progress};
 use crate::gallery::{GALLERY, Gallery};
-use crate::results::{Summary, TheoryRow, diff, export_csv};
+use crate::results::{Summary, TheoryRow, diff, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::measure::index_of;
 use crate::sweep::plan::{self, Plan as SweepPlan};
@@ -237,6 +237,8 @@ struct FleetArgs {
 enum Format {
     /// vehicles.csv, links.csv and topology.csv
     Csv,
+    /// network.toml: when links were up and what they lost, as a section of a mission file
+    Network,
 }
 
 /// How long a single command waits for the fleet to appear.
@@ -270,7 +272,7 @@ fn run(what: What) -> Ended {
         What::Status { json, fleet } => status(json, &fleet.attach),
         What::Stop { fleet } => stop(&fleet.attach),
         What::Report { run } => report(&run),
-        What::Export { run, format: Format::Csv, out } => export(&run, out),
+        What::Export { run, format, out } => export(&run, format, out),
         What::Diff { a, b } => compare(&a, &b),
         What::Recover { recording, out } => recover(&recording, out),
         What::Worst(args) => search(&args),
@@ -460,8 +462,18 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
         bus::tell!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
         print_theory(&theory::rows(mission, Some(summary)));
         let m = &summary.fleet.messages;
+        let more: String = [
+            (m.out_of_range, "out of range"),
+            (m.half_duplex, "unheard while speaking"),
+            (m.collision, "collided"),
+            (m.corrupt, "corrupt"),
+        ]
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what} + "))
+        .collect();
         bus::tell!(
-            "  Messages: {} sent = {} delivered + {} lost + {} with the link down + {} with the queue full + {} in flight",
+            "  Messages: {} sent = {} delivered + {} lost + {} with the link down + {} with the queue full + {more}{} in flight",
             m.sent,
             m.delivered,
             m.lost,
@@ -469,6 +481,10 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
             m.queue_full,
             m.in_flight
         );
+        if m.copied + m.copy_dropped + m.copy_in_flight > 0 {
+            let (copied, dropped, in_flight) = (m.copied, m.copy_dropped, m.copy_in_flight);
+            bus::tell!("  Second copies: {copied} delivered, {dropped} dropped, {in_flight} in flight");
+        }
         bus::tell!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
         bus::tell!("report: {}", folder.join("report.html").display());
     }
@@ -548,14 +564,23 @@ fn report(run: &Path) -> Ended {
     Ok(ExitCode::SUCCESS)
 }
 
-fn export(run: &Path, out: Option<PathBuf>) -> Ended {
+fn export(run: &Path, format: Format, out: Option<PathBuf>) -> Ended {
     let recording = folder::recording(run).map_err(|error| End(4, error))?;
     let beside = if run.is_dir() { run } else { run.parent().unwrap_or(Path::new(".")) };
     let out = out.unwrap_or_else(|| beside.to_path_buf());
     let failed = |error: std::io::Error| End(4, format!("cannot export to {}: {error}", out.display()));
     std::fs::create_dir_all(&out).map_err(failed)?;
-    export_csv(&recording.exact, &out).map_err(failed)?;
-    bus::tell!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
+    match format {
+        Format::Csv => {
+            export_csv(&recording.exact, &out).map_err(failed)?;
+            bus::tell!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
+        }
+        Format::Network => {
+            let path = out.join("network.toml");
+            std::fs::write(&path, network_section(&recording.exact)).map_err(failed)?;
+            bus::tell!("the network of {} rows to {}", recording.exact.len(), path.display());
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 

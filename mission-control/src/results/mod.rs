@@ -22,6 +22,7 @@ pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]
 pub(crate) mod testing;
+mod trace;
 
 pub use diff::{Outcome, Side, diff, origins_differ};
 pub use export::{Exporter, export_csv};
@@ -36,3 +37,4 @@ pub use summary::{
     ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
     Summary, VehicleSummary, summarise, summarise_clock,
 };
+pub use trace::network_section;

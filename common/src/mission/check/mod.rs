@@ -9,7 +9,7 @@ mod vehicle;
 use std::collections::HashMap;
 
 use self::coordination::{check_law, check_told, check_weights};
-use self::network::{check_links, check_switching};
+use self::network::{check_links, check_medium, check_switching, with_preset};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
 use super::build;
@@ -44,10 +44,12 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let speed = check_formation(faults, file);
     let ids = check_ids(faults, &file.vehicles);
     let law = check_law(faults, file, &ids);
-    let links = check_links(faults, file, &ids);
+    let network = with_preset(&file.network);
+    let links = check_links(faults, file, &network, &ids);
     check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
-    let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    let switching = check_switching(faults, file, &network, &ids, links.as_deref().unwrap_or(&[]));
+    let medium = check_medium(faults, file, &network, &ids);
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = build::nominal_factor(&file.coordination.law);
     let vehicles: Vec<Option<VehiclePlan>> =
@@ -73,6 +75,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         links,
         switching,
         queue: file.network.queue as usize,
+        medium,
     };
     Some(mission)
 }
