@@ -18,11 +18,12 @@ pub use shape::schema;
 pub use speed::SpeedProfile;
 
 use crate::coordination::FleetLaw;
-use crate::craft::Craft;
+use crate::craft::{Craft, Limits};
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::path::Path;
 use crate::time::{Span, Time};
+use crate::vehicle::environment::{Disturbances, Environment};
 
 /// A mission that can be flown: every number is in its range and everything fits together.
 #[derive(Clone, Debug)]
@@ -82,6 +83,10 @@ pub struct VehiclePlan {
     pub model: file::ModelChoice,
     /// Its path-following law.
     pub following: file::FollowingChoice,
+    /// What its actuators give at most.
+    pub limits: Limits,
+    /// What disturbs it.
+    pub disturbances: Disturbances,
 }
 
 /// Where a vehicle starts.
@@ -225,6 +230,12 @@ impl Mission {
             scalar: self.law.says().map(|_| 0.0),
         };
         state.encode().len()
+    }
+
+    /// What surrounds a vehicle during its flight; `None` where nothing disturbs it.
+    pub fn environment(&self, vehicle: usize) -> Option<Environment> {
+        let plan = &self.vehicles[vehicle];
+        Environment::new(plan.disturbances, self.seed, &plan.id)
     }
 
     /// The vehicle with its plant and its path-following law, where the mission starts it or at another place.

@@ -1,7 +1,7 @@
 //! The numbers of a run: `summary.json`, a function of mission and seed, and `clock.json`, of the machine too.
 
 use bus::recording::Recording;
-use common::record::{ClockRecord, StateRow};
+use common::record::{ClockRecord, Record, StateRow};
 use common::time::Time;
 use serde::Serialize;
 
@@ -403,6 +403,16 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
             link.from, link.to, link.missing, link.repeated
         ));
     }
+    let told = recording.exact.iter().filter_map(|record| match record {
+        Record::Warning(row) => Some(row),
+        _ => None,
+    });
+    let mut told: Vec<_> = told.collect();
+    told.sort_by_key(|row| (row.t_ns, &row.source, &row.text));
+    for row in told {
+        let periods = if row.count == 1 { "period" } else { "periods" };
+        warnings.push(format!("{}: {}, in {} control {periods}.", row.source, row.text, row.count));
+    }
     warnings
 }
 
@@ -418,7 +428,7 @@ pub(super) fn thinned(count: usize, samples: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::results::testing::{facts, fleet};
-    use common::record::Record;
+    use common::record::NoteRow;
 
     #[test]
     fn the_fleet_is_summarised() {
@@ -467,6 +477,17 @@ mod tests {
         assert_eq!(clock.deadlines.iter().map(|deadlines| deadlines.missed).sum::<u64>(), 6);
         assert_eq!(clock.notes.len(), 1);
         assert_eq!(summarise_clock(&without), ClockSummary { format: 1, ..ClockSummary::default() });
+    }
+
+    #[test]
+    fn warnings_of_the_vehicles_reach_the_summary() {
+        let mut recording = fleet(false);
+        let row = |count| NoteRow { t_ns: 9, source: "v2".into(), text: "an actuator was at its limit".into(), count };
+        recording.exact.extend([Record::Warning(row(1)), Record::Warning(row(40))]);
+        let warnings = summarise(&recording, &facts(false)).warnings;
+        let expected =
+            ["1 control period.", "40 control periods."].map(|n| format!("v2: an actuator was at its limit, in {n}"));
+        assert_eq!(warnings, expected);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! From the file as written to a mission that can be flown, or to everything that is wrong with it.
 
 mod coordination;
+mod environment;
 mod network;
 mod time;
 mod vehicle;

@@ -7,6 +7,7 @@ use super::super::file::{
     FollowingChoice, FollowingType, LawChoice, MissionFile, ModelChoice, PathChoice, SegmentChoice, VehicleSection,
 };
 use super::super::{Pattern, PatternMotion, Start, VehiclePlan, build};
+use super::environment::{check_disturbances, check_limits};
 use crate::coordination::{DemandKind, FleetLaw};
 use crate::path::Path;
 use crate::path::closest::closest_parameter;
@@ -48,6 +49,8 @@ pub(super) fn check_vehicle(
         let allowed = "a following law here or in [fleet]: line_of_sight, proposition31 or theorem47";
         faults.fault(&key, "no following", allowed);
     }
+    let disturbances = check_disturbances(faults, file, index);
+    let limits = model.as_ref().map(|model| check_limits(faults, file, index, model)).unwrap_or_default();
     let path = match build::path(&section.path) {
         Ok(path) => path,
         Err(reason) => {
@@ -63,7 +66,7 @@ pub(super) fn check_vehicle(
     let usable = position.iter().all(|x| x.is_finite());
     let xi = start.xi.or_else(|| usable.then(|| closest_parameter(path.as_ref(), position, true)))?;
     let start = Start { position: position.into(), yaw: start.yaw_deg.to_radians(), speed: start.speed_mps, xi };
-    let plan = VehiclePlan { id: section.id.clone(), pattern, path, start, model, following };
+    let plan = VehiclePlan { id: section.id.clone(), pattern, path, start, model, following, limits, disturbances };
     if let Err(reason) = build::craft(&plan, start, factor, fastest, law.map_or(DemandKind::Rate, |law| law.kind())) {
         faults.fault(&following_key(&key, section), reason, "");
         return None;
@@ -210,7 +213,7 @@ fn check_auxiliary(
     }
 }
 
-fn model_name(model: &ModelChoice) -> &'static str {
+pub(super) fn model_name(model: &ModelChoice) -> &'static str {
     match model {
         ModelChoice::KinematicUnicycle => "kinematic_unicycle",
         ModelChoice::DynamicUnicycle(_) => "dynamic_unicycle",
