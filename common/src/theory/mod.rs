@@ -3,17 +3,33 @@
 //! | statement | source | what it promises | file |
 //! |---|---|---|---|
 //! | two vehicles that switch | Lemma 1.1, (1.6), (1.7); erratum 1.1 | \|x\| decays at (1 − α)a | [`lemma_1_1`] |
+//! | decoupled path following with a leader | (2.15), (2.16), (2.37), (2.38); errata 2.1, 2.3 | stable above a critical λ_p | [`decoupling_2_37`] |
+//! | gateway, with a failed vehicle | (2.29), (2.35), (2.42), (2.43); errata 2.2, 2.11 | stable; a known steady error | [`gateway_2_35`] |
+//! | two-way fixed networks | Propositions 3.4, 3.5; (3.41), (3.48), (3.75) | agreement; exact rates, and one for varying R_i proven here | [`proposition_3_4`], [`linear_coordination`] |
+//! | one-way fixed networks | Propositions 3.6, 3.7, (3.73), (3.81), (3.85), (3.93); errata 3.13, 3.15, 3.16 | agreement at the slowest root | [`proposition_3_6`] |
+//! | bounded speeds with saturation | Proposition 3.8, Lemma 6.1, (3.97); erratum 3.14 | Q > 0 | [`proposition_3_8`] |
 //! | brief connectivity losses | Theorem 4.4; errata 4.4, 4.6 | V at λ_0 − 2αk_mλ_m or min(λ_1, 2(1 − α)k_mλ_m), norms at half | [`theorem_4_4`] |
 //! | connected in mean | Theorems 4.2, 4.5; erratum 4.7 | agreement, with a rate proven here | [`theorem_4_5`] |
 //! | late information | Theorem 4.3, Lemmas 4.4, 4.5; errata 4.1–4.3 | agreement at v_L* = v_L/(1 + kτ) | [`delay`] |
+//! | how fast, on a fixed network | (4.40) | the rightmost root | [`delay_rate`] |
+//! | coordination with a state of its own | Lemmas 4.2, 4.6, 4.7, Theorems 4.8, 4.9, (4.63)–(4.66); errata 4.19, 4.20 | V at (1 − α)λ_c − αλ_d, norms at half | [`lemma_4_6`] |
 //!
 //! Quadratic functions such as V decay at twice the rate of the norms of errors (erratum 4.4). Rates of norms are what
 //! can be laid beside a measurement, so [`Verdict::norm_rate`] is always one of those.
 
 use serde::Serialize;
 
+pub mod decoupling_2_37;
 pub mod delay;
+pub mod delay_rate;
+pub mod gateway_2_35;
 pub mod lemma_1_1;
+pub mod lemma_4_6;
+pub mod linear_coordination;
+pub mod polynomial;
+pub mod proposition_3_4;
+pub mod proposition_3_6;
+pub mod proposition_3_8;
 pub mod theorem_4_4;
 pub mod theorem_4_5;
 

@@ -1,0 +1,227 @@
+//! Sections 2.2.1, 2.2.2 and 2.4: leader and followers, and a gateway that everybody talks with.
+//!
+//! In w_i = v_i/R_i the radii cancel. Every vehicle has the gain a; followers add P(s)/s^m of their distance from the
+//! gateway, with P = bs + c (m = 2), or bs² + cs + d (m = 3) with the extra integrator of section 2.5.3. Then
+//! w_i = (P/q)w_1 with q = s^m(s + a) + P, and the gateway's own equation gives, for n vehicles,
+//!
+//! ```text
+//! q^{n−2} ( s(s + a)(q + (n − 1)P) + b_0 q )                                     all is well (2.35)
+//! q^{n−3} ( s^m(s + a)q + b_0 s^{m−1}q + P(q + (n − 2)s^m(s + a)) )      one follower's speed is stuck (2.42)
+//! ```
+//!
+//! Both need the gateway's sums with the sign of (2.32); with that of (2.33) as printed, the second is unstable for the
+//! thesis' own gains (erratum 2.2).
+
+use super::Verdict;
+use super::polynomial::{abscissa, add, is_hurwitz, multiply, product, scale};
+
+/// A gateway and its followers, all with the same gains.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gateway {
+    /// a \[1/s\]: gain on a vehicle's own speed.
+    pub a: f64,
+    /// \[b, c\], or \[b, c, d\] with the extra integrator: gains on the distance and its integrals \[1/s², 1/s³, 1/s⁴\].
+    pub distance: Vec<f64>,
+    /// b_0 \[1/s²\]: the gateway's gain on the integral of its speed error.
+    pub b_0: f64,
+    /// n: how many vehicles, the gateway included; at least two.
+    pub n: usize,
+}
+
+impl Gateway {
+    /// s^m(s + a).
+    fn free(&self) -> Vec<f64> {
+        multiply(&self.power(self.distance.len()), &[1.0, self.a])
+    }
+
+    /// s^power.
+    fn power(&self, power: usize) -> Vec<f64> {
+        std::iter::once(1.0).chain(std::iter::repeat_n(0.0, power)).collect()
+    }
+
+    /// q = s^m(s + a) + P: a follower alone, λ³ + aλ² + bλ + c for m = 2. Also each follower of a leader (2.29).
+    pub fn follower(&self) -> Vec<f64> {
+        add(&self.free(), &self.distance)
+    }
+
+    /// Characteristic polynomial of the whole (2.35), for n vehicles.
+    pub fn nominal(&self) -> Vec<f64> {
+        let q = self.follower();
+        let others = scale(self.n as f64 - 1.0, &self.distance);
+        let gateway = add(&product(&[&[1.0, self.a, 0.0], &add(&q, &others)]), &scale(self.b_0, &q));
+        self.with_followers(gateway, self.n.saturating_sub(2))
+    }
+
+    /// Characteristic polynomial while the speed of one follower is stuck (2.42).
+    pub fn with_failure(&self) -> Vec<f64> {
+        let (q, free) = (self.follower(), self.free());
+        if self.n <= 2 {
+            // Nobody is left to follow, and q cancels.
+            let speed = self.power(self.distance.len().saturating_sub(1));
+            return add(&q, &scale(self.b_0, &speed));
+        }
+        let speed = multiply(&self.power(self.distance.len().saturating_sub(1)), &scale(self.b_0, &q));
+        let seen = add(&q, &scale(self.n as f64 - 2.0, &free));
+        let gateway = add(&add(&multiply(&free, &q), &speed), &multiply(&self.distance, &seen));
+        self.with_followers(gateway, self.n - 3)
+    }
+
+    fn with_followers(&self, gateway: Vec<f64>, count: usize) -> Vec<f64> {
+        let q = self.follower();
+        (0..count).fold(gateway, |whole, _| multiply(&whole, &q))
+    }
+
+    /// s̄_21 → (b_0/c)(v_0/R_2 − v_1/R_1): the steady error of a vehicle whose speed is stuck at v_0 (2.43); none with
+    /// the extra integrator.
+    pub fn steady_error(&self, stuck: f64, r_2: f64, v_1: f64, r_1: f64) -> f64 {
+        match self.distance.as_slice() {
+            [_, c] => self.b_0 / c * (stuck / r_2 - v_1 / r_1),
+            _ => 0.0,
+        }
+    }
+
+    /// What section 2.2.2 says of this fleet; `failed` if the speed of one follower is stuck.
+    ///
+    /// A stable q makes (2.35) stable for every positive b_0 if the same gain a is used, as the text says.
+    pub fn verdict(&self, failed: bool) -> Verdict {
+        let polynomial = if failed { self.with_failure() } else { self.nominal() };
+        let holds = is_hurwitz(&polynomial);
+        let slowest = abscissa(&polynomial);
+        let (name, condition) = if failed {
+            ("Gateway with a failed follower (2.42)", "all roots of (2.42) in the left half-plane")
+        } else {
+            ("Gateway (2.35)", "all roots of (2.35) in the left half-plane")
+        };
+        Verdict {
+            name,
+            condition: condition.to_owned(),
+            value: slowest.map_or("–".to_owned(), |re| format!("largest real part {re:.4}")),
+            holds,
+            norm_rate: slowest.filter(|_| holds).map(|re| -re),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::spectrum::eigenvalues;
+    use crate::theory::polynomial::roots;
+    use nalgebra::{Complex, DMatrix};
+    use proptest::prelude::*;
+
+    /// Section 2.5.3 with λ = 1.
+    fn section_2_5_3(extra: bool) -> Gateway {
+        let (a, distance) = if extra { (4.0, vec![6.0, 4.0, 1.0]) } else { (3.0, vec![3.0, 1.0]) };
+        Gateway { a, distance, b_0: 5.0, n: 3 }
+    }
+
+    /// (2.32) with states w_i, s̄_1i and its integrals, e_v; `sign` multiplies the gateway's sums of integrals; the
+    /// speed of vehicle 2 is held if it failed.
+    fn matrix(fleet: &Gateway, sign: f64, failed: bool) -> DMatrix<f64> {
+        let (n, m) = (fleet.n, fleet.distance.len());
+        let size = n + m * (n - 1) + 1;
+        let state = |i: usize, level: usize| n + (i - 1) * m + level;
+        let mut matrix = DMatrix::zeros(size, size);
+        for i in 0..n {
+            matrix[(i, i)] = -fleet.a;
+        }
+        matrix[(0, size - 1)] = -fleet.b_0;
+        matrix[(size - 1, 0)] = 1.0;
+        for i in 1..n {
+            for (level, gain) in fleet.distance.iter().enumerate() {
+                matrix[(0, state(i, level))] = -gain * if level == 0 { 1.0 } else { sign };
+                matrix[(i, state(i, level))] = *gain;
+                if level > 0 {
+                    matrix[(state(i, level), state(i, level - 1))] = 1.0;
+                }
+            }
+            matrix[(state(i, 0), 0)] = 1.0;
+            matrix[(state(i, 0), i)] = -1.0;
+        }
+        if failed { matrix.remove_row(1).remove_column(1) } else { matrix }
+    }
+
+    fn abscissa_of(matrix: &DMatrix<f64>) -> f64 {
+        // The integral of a stuck vehicle's distance and that of the gateway's speed error differ by a constant: without
+        // it, one eigenvalue of the stuck fleet is zero and says nothing.
+        let found = eigenvalues(matrix).expect("it settles");
+        found.iter().filter(|e| e.norm() > 1e-6).map(|e| e.re).max_by(f64::total_cmp).expect("some are not zero")
+    }
+
+    #[test]
+    fn erratum_2_2_signs() {
+        for (extra, nominal, failed, printed_nominal, printed_failed) in
+            [(false, -0.335, -0.138, -0.129, 0.1218), (true, f64::NAN, -0.207, f64::NAN, 0.485)]
+        {
+            let fleet = section_2_5_3(extra);
+            let close = |found: f64, known: f64| known.is_nan() || (found - known).abs() < 1e-3;
+            let slowest = |polynomial: &[f64]| abscissa(polynomial).expect("a polynomial");
+            assert!(close(slowest(&fleet.nominal()), nominal), "{}", slowest(&fleet.nominal()));
+            assert!(close(slowest(&fleet.with_failure()), failed), "{}", slowest(&fleet.with_failure()));
+            assert!(close(abscissa_of(&matrix(&fleet, -1.0, false)), printed_nominal));
+            assert!(close(abscissa_of(&matrix(&fleet, -1.0, true)), printed_failed), "as printed it is unstable");
+        }
+    }
+
+    #[test]
+    fn section_2_5_3_leaves_0_083_rad() {
+        let error = section_2_5_3(false).steady_error(0.25, 3.0, 0.2, 2.0);
+        assert!((error + 0.083_333).abs() < 1e-6, "{error}");
+        assert!((error.abs().to_degrees() - 4.7746).abs() < 1e-4, "erratum 2.11");
+        assert_eq!(section_2_5_3(true).steady_error(0.25, 3.0, 0.2, 2.0), 0.0);
+    }
+
+    #[test]
+    fn equation_2_35_for_three() {
+        // (λ³ + aλ² + bλ + c)(λ(λ + a)(λ³ + aλ² + 3bλ + 3c) + b_0(λ³ + aλ² + bλ + c))
+        let fleet = Gateway { a: 2.0, distance: vec![0.7, 0.3], b_0: 1.5, n: 3 };
+        let q = [1.0, 2.0, 0.7, 0.3];
+        let inner = add(&product(&[&[1.0, 2.0, 0.0], &[1.0, 2.0, 2.1, 0.9]]), &scale(1.5, &q));
+        let expected = multiply(&q, &inner);
+        assert!(fleet.nominal().iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+
+    fn any_fleet() -> impl Strategy<Value = Gateway> {
+        (0.2..4.0f64, prop::collection::vec(0.1..4.0f64, 2..4), 0.1..8.0f64, 2usize..6)
+            .prop_map(|(a, distance, b_0, n)| Gateway { a, distance, b_0, n })
+    }
+
+    proptest! {
+        #[test]
+        fn the_polynomials_are_those_of_the_matrices(fleet in any_fleet()) {
+            for (polynomial, matrix) in [
+                (fleet.nominal(), matrix(&fleet, 1.0, false)),
+                (fleet.with_failure(), matrix(&fleet, 1.0, true)),
+            ] {
+                // Values of det(s − A) at points off the axes.
+                for s in [Complex::new(0.3, 1.1), Complex::new(-0.7, 0.4), Complex::new(1.5, -0.2)] {
+                    let size = matrix.nrows();
+                    let shifted = DMatrix::identity(size, size) * s - matrix.map(Complex::from);
+                    let horner = polynomial.iter().fold(Complex::from(0.0), |sum, c| sum * s + c);
+                    // The matrix of the stuck fleet has states more: they only integrate.
+                    let surplus = size + 1 - polynomial.len();
+                    let expected = shifted.determinant() / s.powi(surplus as i32);
+                    prop_assert!((horner - expected).norm() < 1e-8 * (1.0 + horner.norm()), "{} {}", horner, expected);
+                }
+            }
+        }
+
+        #[test]
+        fn a_stable_follower_makes_a_stable_gateway(a in 0.2..4.0f64, b in 0.1..4.0f64, part in 0.01..0.99f64,
+            b_0 in 0.01..20.0f64, n in 2usize..7) {
+            // The text's claim below (2.35): c < ab is all it takes.
+            let fleet = Gateway { a, distance: vec![b, part * a * b], b_0, n };
+            prop_assert!(is_hurwitz(&fleet.follower()));
+            let slowest = roots(&fleet.nominal()).expect("a polynomial");
+            prop_assert!(slowest.iter().all(|root| root.re < 1e-3), "{:?}", fleet);
+        }
+
+        #[test]
+        fn an_unstable_follower_makes_an_unstable_gateway(a in 0.2..4.0f64, b in 0.1..4.0f64, part in 1.05..3.0f64,
+            b_0 in 0.01..20.0f64, n in 3usize..7) {
+            let fleet = Gateway { a, distance: vec![b, part * a * b], b_0, n };
+            prop_assert!(!fleet.verdict(false).holds);
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Linear coordination laws on a fixed network: how fast the whole fleet agrees, from the eigenvalues of the closed loop.
+//!
+//! A law u = −Eη − Gξ with G1 = 0 in η' = u, ξ' = Cη + v_L1 (3.41) leaves, with θ = F_2ξ and F_1, F_2 of (3.6),
+//!
+//! ```text
+//! η' = −Eη − GF_1 θ,    θ' = F_2Cη
+//! ```
+//!
+//! as in (3.75). θ = 0 means agreement. With constant C its eigenvalues are the exact rates, whatever the graph.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::graph::Graph;
+use crate::graph::incidence::Differences;
+use crate::graph::spectrum::eigenvalues;
+
+/// A linear coordination law of chapter 3 with the same gains for every vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// u = −(LC + C + A)η − ALξ (3.43).
+    SolutionOne {
+        /// a \[1/s\].
+        a: f64,
+    },
+    /// u = −Aη − BCLξ (3.44).
+    SolutionTwo {
+        /// a \[1/s\].
+        a: f64,
+        /// b \[m²/s²\].
+        b: f64,
+    },
+    /// u = −(A⁻¹L + A)Cη − B(η + A⁻¹Lξ): (3.45) while nothing is saturated.
+    SolutionThree {
+        /// a \[m/s\] for ξ without unit.
+        a: f64,
+        /// b \[1/s\].
+        b: f64,
+    },
+    /// u = −aη − bC⁻¹Lξ (3.72).
+    Directed {
+        /// a \[1/s\].
+        a: f64,
+        /// b \[1/s²\].
+        b: f64,
+    },
+}
+
+impl Law {
+    /// (E, G) of u = −Eη − Gξ, for C = diag(1/R_i) and the Laplacian L.
+    pub fn matrices(self, c: &DVector<f64>, l: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let n = c.len();
+        let identity = DMatrix::identity(n, n);
+        let c = DMatrix::from_diagonal(c);
+        match self {
+            Law::SolutionOne { a } => (l * &c + &c + &identity * a, l * a),
+            Law::SolutionTwo { a, b } => (identity * a, &c * l * b),
+            Law::SolutionThree { a, b } => ((l / a + &identity * a) * &c + identity * b, l * (b / a)),
+            Law::Directed { a, b } => (identity * a, c.map_diagonal_inverse() * l * b),
+        }
+    }
+
+    /// Eigenvalues of the closed loop in (η, θ) on this graph, with R_i \[m per unit of ξ\] constant. `None` if the
+    /// graph cannot agree, or something is not positive and finite.
+    pub fn eigenvalues(self, graph: &Graph, r: &[f64]) -> Option<Vec<Complex<f64>>> {
+        let n = graph.len();
+        if r.len() != n || !r.iter().all(|&r| r > 0.0 && r.is_finite()) {
+            return None;
+        }
+        let c = DVector::from_iterator(n, r.iter().map(|r| 1.0 / r));
+        let split = Differences::of(graph)?;
+        let (e, g) = self.matrices(&c, &graph.laplacian());
+        let mut closed = DMatrix::zeros(2 * n - 1, 2 * n - 1);
+        closed.view_mut((0, 0), (n, n)).copy_from(&-e);
+        closed.view_mut((0, n), (n, n - 1)).copy_from(&-(g * &split.f_1));
+        closed.view_mut((n, 0), (n - 1, n)).copy_from(&(&split.f_2 * DMatrix::from_diagonal(&c)));
+        eigenvalues(&closed)
+    }
+
+    /// The rate of the slowest mode \[1/s\], negative if it grows. `None` as for [`Law::eigenvalues`].
+    pub fn rate(self, graph: &Graph, r: &[f64]) -> Option<f64> {
+        self.eigenvalues(graph, r)?.iter().map(|eigenvalue| -eigenvalue.re).min_by(f64::total_cmp)
+    }
+}
+
+/// The inverse of a diagonal matrix.
+trait DiagonalInverse {
+    fn map_diagonal_inverse(&self) -> DMatrix<f64>;
+}
+
+impl DiagonalInverse for DMatrix<f64> {
+    fn map_diagonal_inverse(&self) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.diagonal().map(|entry| 1.0 / entry))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::Law;
+    use crate::graph::Graph;
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    /// A connected graph with two-way links: a random tree and some more edges.
+    pub(crate) fn connected_graph() -> impl Strategy<Value = Graph> {
+        (2usize..6).prop_flat_map(|n| {
+            let parents = prop::collection::vec(any::<prop::sample::Index>(), n - 1);
+            let more = prop::collection::vec((0..n, 0..n), 0..n);
+            (parents, more).prop_map(move |(parents, more)| {
+                let mut edges: Vec<_> = parents.iter().enumerate().map(|(i, p)| (i + 1, p.index(i + 1))).collect();
+                edges.extend(more);
+                Graph::from_edges(n, &edges)
+            })
+        })
+    }
+
+    /// (η, ξ) after `t` seconds of the closed loop, exactly.
+    pub(crate) fn flow(law: Law, graph: &Graph, r: &[f64], t: f64) -> DMatrix<f64> {
+        let n = graph.len();
+        let c = DVector::from_iterator(n, r.iter().map(|r| 1.0 / r));
+        let (e, g) = law.matrices(&c, &graph.laplacian());
+        let mut closed = DMatrix::zeros(2 * n, 2 * n);
+        closed.view_mut((0, 0), (n, n)).copy_from(&-e);
+        closed.view_mut((0, n), (n, n)).copy_from(&-g);
+        closed.view_mut((n, 0), (n, n)).copy_from(&DMatrix::from_diagonal(&c));
+        (closed * t).exp()
+    }
+
+    #[test]
+    fn a_pair_in_closed_form() {
+        // R = 1, a = 1, solution I: η_1 − η_2 and ξ_1 − ξ_2 give s² + (3 + a)s + 2a, the mean of η decays at 1 + a.
+        let pair = Graph::complete(2);
+        let rate = Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0; 2]).expect("connected");
+        assert!((rate - (2.0 - 2f64.sqrt())).abs() < 1e-12);
+        assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&Graph::empty(2), &[1.0; 2]), None);
+        assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0]), None);
+        assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0, 0.0]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn proposition_3_4_solutions_agree_on_every_connected_graph(
+            graph in connected_graph(), a in 0.1..3.0f64, b in 0.1..3.0f64, r in prop::collection::vec(0.2..4.0f64, 6)
+        ) {
+            let r = &r[..graph.len()];
+            for law in [Law::SolutionOne { a }, Law::SolutionTwo { a, b }, Law::SolutionThree { a, b }] {
+                let rate = law.rate(&graph, r).expect("connected");
+                prop_assert!(rate > 0.0, "{:?} {}", law, rate);
+                // The exponential of the whole loop says the same: beyond the slowest mode nothing is left.
+                let after = flow(law, &graph, r, 25.0 / rate) * DVector::from_fn(2 * graph.len(), |i, _| i as f64);
+                let xi = after.rows(graph.len(), graph.len());
+                prop_assert!(xi.max() - xi.min() < 1e-6 * (1.0 + xi.amax()));
+            }
+        }
+
+        #[test]
+        fn proposition_3_4_needs_a_connected_graph(a in 0.1..3.0f64) {
+            let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]);
+            prop_assert_eq!(Law::SolutionOne { a }.rate(&apart, &[1.0; 4]), None);
+            let after = flow(Law::SolutionOne { a }, &apart, &[1.0; 4], 500.0) * DVector::from_fn(8, |i, _| i as f64);
+            prop_assert!((after[7] - after[4]).abs() > 1.0, "two clusters stay apart");
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Proposition 3.8 and Lemma 6.1: speeds stay bounded with the saturated law (3.45), so path following and coordination
+//! go together.
+//!
+//! What the proof needs is Q = C⁻¹A⁻¹L + LC⁻¹A⁻¹ + 2C⁻¹A > 0 for every C on the way. (3.97) is enough for that by
+//! Geršgorin's circles, not necessary: Figures 3.7 and 3.8 break it and are fine (erratum 3.14). So Q itself is looked at
+//! too, with the R_i that occur.
+
+use nalgebra::DMatrix;
+
+use super::Verdict;
+use crate::graph::Graph;
+use crate::graph::spectrum::symmetric_eigenvalues;
+
+/// ½(c_2/c_1 − a_1/a_2) max |N_i|: what a_1² must exceed (3.97), for gains and R_i within their bounds.
+pub fn threshold(graph: &Graph, a: &[f64], r: &[f64]) -> f64 {
+    let most = (0..graph.len()).map(|i| graph.degree(i)).max().unwrap_or(0) as f64;
+    0.5 * (spread(r) - 1.0 / spread(a)) * most
+}
+
+/// Largest over smallest.
+fn spread(values: &[f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::INFINITY, 0.0f64), |(low, high), &v| (low.min(v), high.max(v)));
+    high / low
+}
+
+/// The least eigenvalue of Q = C⁻¹A⁻¹L + LC⁻¹A⁻¹ + 2C⁻¹A (Lemma 6.1) for these R_i; `None` if sizes differ.
+pub fn least_eigenvalue(graph: &Graph, a: &[f64], r: &[f64]) -> Option<f64> {
+    let n = graph.len();
+    if a.len() != n || r.len() != n {
+        return None;
+    }
+    let l = graph.laplacian();
+    let q = DMatrix::from_fn(n, n, |i, j| {
+        l[(i, j)] * (r[i] / a[i] + r[j] / a[j]) + if i == j { 2.0 * r[i] * a[i] } else { 0.0 }
+    });
+    symmetric_eigenvalues(&q).first().copied()
+}
+
+/// What the proposition says of a fleet with gains a_i that meets these R_i on its way, one list for each place.
+///
+/// It holds if (3.97) does at every place, or else if Q > 0 at every place.
+pub fn verdict(graph: &Graph, a: &[f64], places: &[Vec<f64>]) -> Verdict {
+    let a_1 = a.iter().copied().fold(f64::INFINITY, f64::min);
+    // C changes along the way, and the bounds (3.42) are those over all places.
+    let all: Vec<f64> = places.iter().flatten().copied().collect();
+    let threshold = threshold(graph, a, &all);
+    let least = places.iter().filter_map(|r| least_eigenvalue(graph, a, r)).min_by(f64::total_cmp);
+    let meets = a_1 * a_1 > threshold;
+    let two_way = graph.is_undirected() && graph.is_connected();
+    Verdict {
+        name: "Proposition 3.8 (bounded speeds)",
+        condition: format!("two-way and connected; Q > 0, for which a₁² > {threshold:.4} (3.97) is enough"),
+        value: format!(
+            "a₁² = {:.4}{}, least eigenvalue of Q {}",
+            a_1 * a_1,
+            if meets { "" } else { ", not enough" },
+            least.map_or("–".to_owned(), |least| format!("{least:.4}"))
+        ),
+        holds: two_way && (meets || least.is_some_and(|least| least > 0.0)),
+        norm_rate: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::theory::linear_coordination::tests::connected_graph;
+    use proptest::prelude::*;
+
+    #[test]
+    fn erratum_3_14_figure_3_7_breaks_the_bound_and_is_fine() {
+        let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        let legs = [vec![2.0, 3.0, 4.0], vec![1.0; 3], vec![4.0, 3.0, 2.0]];
+        assert!((threshold(&star, &[1.0; 3], &legs[0]) - 1.0).abs() < 1e-12, "1 > 1 on an arc");
+        assert!((threshold(&star, &[1.0; 3], &legs.concat()) - 3.0).abs() < 1e-12, "1 > 3 on all legs");
+        let least = |r: &Vec<f64>| least_eigenvalue(&star, &[1.0; 3], r).expect("sizes fit");
+        let of_legs: Vec<f64> = legs.iter().map(least).collect();
+        assert!(of_legs.iter().all(|&least| (2.0 - 1e-9..5.2).contains(&least)), "{of_legs:?}");
+        let verdict = verdict(&star, &[1.0; 3], &legs);
+        assert!(verdict.holds && verdict.value.contains("not enough"));
+    }
+
+    #[test]
+    fn very_different_paths_break_it() {
+        let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        let verdict = verdict(&star, &[0.2; 3], &[vec![20.0, 1.0, 1.0]]);
+        assert!(!verdict.holds, "{verdict:?}");
+        assert_eq!(least_eigenvalue(&star, &[1.0; 2], &[1.0; 3]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn lemma_6_1_the_bound_is_enough(
+            graph in connected_graph(), r in prop::collection::vec(0.5..3.0f64, 6), a in prop::collection::vec(0.5..3.0f64, 6)
+        ) {
+            let (a, r) = (&a[..graph.len()], &r[..graph.len()]);
+            let a_1 = a.iter().copied().fold(f64::INFINITY, f64::min);
+            // Raised until they meet (3.97).
+            let needed = (threshold(&graph, a, r).max(0.0)).sqrt() / a_1 * 1.001;
+            let a: Vec<f64> = a.iter().map(|a| a * needed.max(1.0)).collect();
+            prop_assert!(least_eigenvalue(&graph, &a, r).expect("sizes fit") > 0.0);
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! Coordination with late information, (4.34) and (4.42).
+
+use common::mission::Delay;
+use common::mission::file::{Delayed, LawChoice};
+use common::theory::delay::{self, DelayGains};
+use common::time::Span;
+
+use super::Case;
+use crate::results::TheoryRow;
+
+pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
+    let Case { mission, network, .. } = case;
+    let tau = Span::from_secs(law.delay_s);
+    let v_l = mission.speed.at(mission.end).v_l;
+    let in_mean = network.planned.connected_in_mean().is_some();
+    let verdict = delay::verdict(DelayGains::Averaged(law.gain), tau, v_l, in_mean);
+    let bears_losses = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_));
+    let always_heard = bears_losses || network.leaves_nobody_alone();
+    let told = mission.links.iter().all(|link| told_truly(link.delay, law.delay_s) && link.loss == 0.0);
+    vec![TheoryRow {
+        name: verdict.name.into(),
+        condition: if bears_losses {
+            format!("{}, every message τ late and none lost but by the switching", verdict.condition)
+        } else {
+            format!("{}, every vehicle always hears someone, every message τ late", verdict.condition)
+        },
+        holds: Some(verdict.holds && always_heard && told),
+        predicted: "exponential agreement, no rate".into(),
+        measured: case.fitted_rate(),
+    }]
+}
+
+/// Whether the law was told the delay that the link has.
+pub(super) fn told_truly(delay: Delay, tau: f64) -> bool {
+    delay == Delay::Constant(Span::from_secs(tau))
+}

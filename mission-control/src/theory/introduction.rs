@@ -1,0 +1,34 @@
+//! Two vehicles on lines, (1.5).
+
+use common::mission::file::{GainOnly, LeaderIntegral};
+
+use super::{Case, Guarantee};
+use crate::results::TheoryRow;
+
+/// Lemma 1.1 with e' = −(a_1(t) + a_2(t)) e, where a_i(t) is the gain while vehicle i hears the other.
+pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
+    let rate = law.gain * case.network.up.iter().sum::<f64>();
+    (case.network.immediate && rate > 0.0).then_some(Guarantee { rate, factor: None })
+}
+
+pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
+    vec![TheoryRow {
+        name: "Rate of coordination (Lemma 1.1)".into(),
+        condition: "no delay and no loss but the switching".into(),
+        holds: Some(case.network.immediate),
+        predicted: guarantee(case, law).map_or("–".into(), |g| format!("{:.5} 1/s on the paths", g.rate)),
+        measured: case.fitted_rate(),
+    }]
+}
+
+/// The law after (1.5) in which one vehicle learns v_L: s² + 2a s + b.
+pub(super) fn rows_of_a_leader(case: &Case<'_>, law: &LeaderIntegral) -> Vec<TheoryRow> {
+    let rate = law.a - (law.a * law.a - law.b).max(0.0).sqrt();
+    vec![TheoryRow {
+        name: "One vehicle learns v_L (section 1.2, after (1.5))".into(),
+        condition: "fixed two-way link, no delay, no loss, v_L constant".into(),
+        holds: Some(case.network.is_fixed() && case.network.graph.is_undirected()),
+        predicted: format!("{rate:.5} 1/s on the paths"),
+        measured: case.fitted_rate(),
+    }]
+}

@@ -1,0 +1,115 @@
+//! Theory beside measurement: the conditions of the statements that speak about a mission, and what they promise.
+//!
+//! Each family of laws has a file with two functions of a [`Case`]: `rows`, the statements behind its laws, and
+//! `guarantee`, the decay of the coordination error that they promise. A new law needs a line in [`law_rows`], and one in
+//! [`guarantee_of`] if there is a rate.
+//!
+//! | what | source | file |
+//! |---|---|---|
+//! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
+//! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
+//! | solutions I to III | Propositions 3.4, 3.5 | `solutions.rs` |
+//! | one-way links, one told vehicle | Propositions 3.6, 3.7, Remark 3.13 | `directed.rs` |
+//! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
+//! | switching networks | Theorems 4.4, 4.5 | `switching.rs` |
+//! | late information | Lemmas 4.4, 4.5 | `delayed.rs` |
+//!
+//! The mathematics is in `common::theory`; here is only which statement speaks of which mission, and in which words.
+
+mod auxiliary;
+mod delayed;
+mod directed;
+mod fleet;
+mod introduction;
+mod network;
+mod solutions;
+mod switching;
+
+use common::mission::Mission;
+use common::mission::file::LawChoice;
+
+use crate::results::{Summary, TheoryRow};
+use network::Network;
+
+/// A guaranteed decay of the coordination error: ‖e(t)‖ ≤ factor · exp(−rate t) ‖e(0)‖.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guarantee {
+    /// Rate of the norm \[1/s\].
+    pub rate: f64,
+    /// Factor, where it is known.
+    pub factor: Option<f64>,
+}
+
+/// A mission as the statements see it: before a flight, or after it with what was measured.
+struct Case<'a> {
+    mission: &'a Mission,
+    network: Network,
+    summary: Option<&'a Summary>,
+}
+
+impl<'a> Case<'a> {
+    fn new(mission: &'a Mission, summary: Option<&'a Summary>) -> Case<'a> {
+        Case { mission, network: Network::of(mission), summary }
+    }
+
+    /// A measured value in words, or a dash before the flight.
+    fn measured(&self, value: impl Fn(&Summary) -> String) -> String {
+        self.summary.map_or_else(|| "–".to_string(), value)
+    }
+
+    /// The measured rate of coordination.
+    fn fitted_rate(&self) -> String {
+        self.measured(|s| s.fleet.coordination.fit.as_ref().map_or("–".into(), |fit| format!("{:.5} 1/s", fit.rate)))
+    }
+}
+
+/// What theory guarantees for the coordination error of this mission, if it speaks about it.
+pub fn guarantee(mission: &Mission) -> Option<Guarantee> {
+    guarantee_of(&Case::new(mission, None))
+}
+
+fn guarantee_of(case: &Case<'_>) -> Option<Guarantee> {
+    match &case.mission.law_choice {
+        LawChoice::Introduction(law) => introduction::guarantee(case, law),
+        LawChoice::Switching(law) => switching::guarantee(case, law),
+        LawChoice::AuxiliarySwitching(law) => auxiliary::guarantee(case, law),
+        _ => None,
+    }
+}
+
+/// Conditions and predictions before a flight, for `check`; with the measured values after it.
+pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
+    let case = Case::new(mission, summary);
+    let mut rows = vec![fleet::graph(&case)];
+    if mission.vehicles.len() > 1 {
+        rows.push(fleet::losses(&case));
+        rows.push(fleet::connected_in_mean(&case));
+        rows.extend(law_rows(&case));
+    }
+    rows.push(fleet::speed(&case));
+    rows.extend(fleet::bias(&case));
+    rows
+}
+
+/// What the statements behind the mission's law ask for and promise.
+fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
+    match &case.mission.law_choice {
+        LawChoice::Introduction(law) => introduction::rows(case, law),
+        LawChoice::LeaderIntegral(law) => introduction::rows_of_a_leader(case, law),
+        LawChoice::Solution2(law) if !case.network.graph.is_undirected() => {
+            directed::rows_of_solution_2(case, law.a, law.b)
+        }
+        LawChoice::Weighted(_) => {
+            solutions::rows(case, "3.4 with weights (Remark 3.10), constant C", "exponential agreement")
+        }
+        LawChoice::MovingPattern(_) => solutions::rows(case, "3.5 about a moving pattern (section 3.3.3)", "agreement"),
+        LawChoice::Directed(law) => directed::rows(case, law.a, law.b),
+        LawChoice::TrulyDecentralised(law) => directed::rows_of_a_told_vehicle(case, law),
+        LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
+        LawChoice::AuxiliarySwitching(law) => auxiliary::rows_switching(case, law),
+        LawChoice::Solution1(_) | LawChoice::Solution2(_) => solutions::rows(case, "3.4", "exponential agreement"),
+        LawChoice::Solution3(_) => solutions::rows(case, "3.5", "agreement"),
+        LawChoice::Switching(law) => switching::rows(case, law),
+        LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),
+    }
+}
