@@ -9,7 +9,7 @@ use common::machine::Machine;
 use common::mission::{Mission, SpeedProfile, Start};
 use common::record::{ClockRecord, Name, NoteRow, Record, Row, StateRow, TicksRow};
 use common::time::Time;
-use common::vehicle::environment::Environment;
+use common::vehicle::environment::{Conditions, Environment};
 use common::wire::Garbage;
 use common::wire::state::CoordinationState;
 use common::wire::vehicle::SpeedCommand;
@@ -204,9 +204,11 @@ impl Flight {
     /// Exposes the vehicle to what disturbs it in a control period.
     fn expose(&mut self, tick: i64) {
         let now = self.instant(tick);
-        if let Some(environment) = &mut self.environment {
-            self.craft.expose(&environment.conditions(now, tick as u64));
-        }
+        let conditions = match &mut self.environment {
+            Some(environment) => environment.conditions(now, tick as u64),
+            None => Conditions { now, ..Conditions::default() },
+        };
+        self.craft.expose(&conditions);
     }
 
     /// One control period: disturbances, neighbours, coordination, path following, message, record.
