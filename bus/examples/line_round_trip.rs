@@ -9,7 +9,6 @@
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command};
-
 use std::time::{Duration, Instant};
 
 use bus::Plane;

@@ -20,7 +20,7 @@ use super::{Mission, SpeedProfile, VehiclePlan, digest};
 use crate::time::Span;
 
 /// Most vehicles in a mission.
-pub(super) const MOST_VEHICLES: usize = 64;
+pub(super) const MOST_VEHICLES: usize = 256;
 
 /// Longest mission \[s\]: thirty days.
 pub(super) const LONGEST: f64 = 30.0 * 86_400.0;
