@@ -10,9 +10,11 @@
 //! | `wire.rs` | what one directed link does to a message |
 //! | `sender.rs` | when a vehicle may speak, on a shared medium |
 //! | `air.rs` | what overlaps at a receiver, on a shared medium |
+//! | `books.rs` | what is written down about it |
 //! | `parcel.rs` | in which order messages arrive that are due at the same instant |
 
 mod air;
+mod books;
 mod parcel;
 mod sender;
 #[cfg(test)]
@@ -34,6 +36,7 @@ use common::wire::state::CoordinationState;
 use common::wire::{Garbage, GarbageCount};
 
 use self::air::Air;
+use self::books::unsent;
 use self::parcel::{Parcel, UnderWay};
 use self::sender::Sender;
 use self::wire::{Wire, flip};
@@ -138,47 +141,6 @@ impl Emulator {
         }
     }
 
-    /// The ledger of each directed link, in the order of the mission's links.
-    pub fn ledgers(&self) -> impl Iterator<Item = &Ledger> {
-        self.links.iter().map(|link| &link.ledger)
-    }
-
-    /// Sent, delivered, dropped, in flight, over all links.
-    pub fn totals(&self) -> [u64; 4] {
-        let add =
-            |[s, d, x, f]: [u64; 4], l: &Ledger| [s + l.sent, d + l.delivered(), x + l.dropped(), f + l.in_flight];
-        self.ledgers().fold([0; 4], add)
-    }
-
-    /// Garbage counted per vehicle.
-    pub fn garbage(&self) -> &[GarbageCount] {
-        &self.garbage
-    }
-
-    /// Closes the books: what is under way, or still waits to be sent, is recorded as such.
-    pub fn finish(&mut self, now: Time) {
-        for Reverse(message) in std::mem::take(&mut self.under_way).into_sorted_vec().into_iter().rev() {
-            let fate = if message.copy { Fate::CopyInFlight } else { Fate::InFlight };
-            self.record_message(now, &message, fate);
-        }
-        for vehicle in 0..self.senders.len() {
-            for parcel in self.senders[vehicle].rest() {
-                for slot in 0..self.out[vehicle].len() {
-                    let message = unsent(now, &parcel, self.out[vehicle][slot]);
-                    self.record_message(now, &message, Fate::InFlight);
-                }
-            }
-        }
-        for (vehicle, garbage) in self.garbage.iter().enumerate() {
-            if garbage.total() > 0 {
-                let text = format!("messages ignored that came from {}", self.mission.vehicles[vehicle].id);
-                let source = "network-emulator".to_string();
-                let row = NoteRow { t_ns: now.nanos(), source, text, count: garbage.total() };
-                self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Note(row))));
-            }
-        }
-    }
-
     /// Takes a message from a vehicle: one decision per directed link.
     fn take(&mut self, now: Time, sent: &Sent) -> Result<(), Garbage> {
         let state = CoordinationState::decode(&sent.bytes)?;
@@ -256,27 +218,6 @@ impl Emulator {
         self.under_way.push(Reverse(message));
     }
 
-    fn settle(&mut self, t: Time, message: &UnderWay, fate: Fate) {
-        self.links[message.link].ledger.settle(fate);
-        self.record_message(t, message, fate);
-    }
-
-    fn record_message(&mut self, t: Time, message: &UnderWay, fate: Fate) {
-        self.record_settled(t, message, fate, None);
-    }
-
-    fn record_settled(&mut self, t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i64>) {
-        self.outputs.push_back(Channel::Settled(Settled {
-            t_ns: t.nanos(),
-            link: message.link,
-            seq: message.parcel.number,
-            sent_ns: message.parcel.sent.nanos(),
-            due_ns: message.due.nanos(),
-            fate,
-            late_ns,
-        }));
-    }
-
     /// A message has come to the end of its way: it is received if the link is up at that instant (p(t) gates reception,
     /// erratum 4.22), and nothing spoilt it meanwhile.
     fn arrive(&mut self, now: Time, message: UnderWay) {
@@ -321,15 +262,24 @@ impl Emulator {
         self.next_change = self.switching.next_change_after(t).filter(|change| *change <= self.mission.end);
     }
 
+    /// Changes, transmissions and arrivals up to an instant, in the order of their instants. At the same instant the link
+    /// changes first, so that an interval of up time contains its begin and not its end.
+    fn catch_up(&mut self, now: Time, until: Time) {
+        while let Some(next) = self.poll_timeout().filter(|next| *next <= until) {
+            if self.next_change.is_some_and(|change| change <= next) {
+                self.change(next, true);
+            } else if let Some((start, vehicle)) = self.next_speaker().filter(|(start, _)| *start <= next) {
+                self.speak(start, vehicle);
+            } else if let Some(Reverse(message)) = self.under_way.pop() {
+                self.arrive(now, message);
+            }
+        }
+    }
+
     /// Who speaks next, and when; the first of those who speak at the same instant.
     fn next_speaker(&self) -> Option<(Time, usize)> {
         self.senders.iter().enumerate().filter_map(|(vehicle, sender)| Some((sender.next()?, vehicle))).min()
     }
-}
-
-/// A message that never left its sender.
-fn unsent(now: Time, parcel: &Parcel, link: usize) -> UnderWay {
-    UnderWay { due: now, parcel: parcel.clone(), link, copy: false, corrupt: false, reception: None }
 }
 
 impl Machine for Emulator {
@@ -339,6 +289,10 @@ impl Machine for Emulator {
     fn handle(&mut self, now: Time, input: Option<Sent>) {
         match input {
             Some(sent) => {
+                if self.mission.medium.is_some() {
+                    // Who was to speak before this word was said has spoken, however late that is looked at.
+                    self.catch_up(now, now - Span::from_nanos(1));
+                }
                 if let Err(kind) = self.take(now, &sent)
                     && self.garbage[sent.from].count(kind)
                 {
@@ -348,19 +302,7 @@ impl Machine for Emulator {
                     self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Note(row))));
                 }
             }
-            None => {
-                // Changes, transmissions and arrivals in the order of their instants. At the same instant the link changes
-                // first, so that an interval of up time contains its begin and not its end.
-                while let Some(next) = self.poll_timeout().filter(|next| *next <= now) {
-                    if self.next_change.is_some_and(|change| change <= next) {
-                        self.change(next, true);
-                    } else if let Some((start, vehicle)) = self.next_speaker().filter(|(start, _)| *start <= next) {
-                        self.speak(start, vehicle);
-                    } else if let Some(Reverse(message)) = self.under_way.pop() {
-                        self.arrive(now, message);
-                    }
-                }
-            }
+            None => self.catch_up(now, now),
         }
     }
 

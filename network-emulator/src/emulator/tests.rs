@@ -362,6 +362,19 @@ fn a_full_sender_may_drop_what_has_waited_longest() {
 }
 
 #[test]
+fn it_makes_no_difference_when_one_looks() {
+    // The first word goes out at 1 s. Whether that is looked at then or only when the third comes, it is gone.
+    let mission = shared("queue = 1, when_full = \"drop_old\"");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for (at, seq) in [(1.0, 0), (1.2, 1), (1.4, 2)] {
+        emulator.handle(seconds(at), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+    }
+    emulator.handle(seconds(20.0), None);
+    let wanted = [Fate::Delivered, Fate::QueueFull, Fate::Delivered];
+    assert_eq!(fates(&drain(&mut emulator), "v1", "v2"), (0..).zip(wanted).collect::<Vec<_>>());
+}
+
+#[test]
 fn messages_that_overlap_at_a_receiver_destroy_one_another_there_only() {
     let mission = shared("collisions = true");
     // v1 and v3 overlap at v2; v2's word is alone at v1 and at v3.
