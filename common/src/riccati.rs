@@ -92,7 +92,8 @@ mod tests {
     fn a_double_integrator_in_closed_form() {
         // ẍ = u with cost q₁x² + q₂ẋ² + u²: X = [√(q₁(q₂ + 2√q₁)), √q₁; ·, √(q₂ + 2√q₁)].
         let (q_1, q_2) = (4.0f64, 0.3f64);
-        let x = stabilising(&dmatrix![0.0, 1.0; 0.0, 0.0], &dmatrix![0.0, 0.0; 0.0, 1.0], &dmatrix![q_1, 0.0; 0.0, q_2]);
+        let x =
+            stabilising(&dmatrix![0.0, 1.0; 0.0, 0.0], &dmatrix![0.0, 0.0; 0.0, 1.0], &dmatrix![q_1, 0.0; 0.0, q_2]);
         let root = (q_2 + 2.0 * q_1.sqrt()).sqrt();
         let exact = dmatrix![q_1.sqrt() * root, q_1.sqrt(); q_1.sqrt(), root];
         assert!((x.unwrap() - exact).norm() < 1e-12);

@@ -5,11 +5,13 @@
 //! |---|---|---|---|---|
 //! | kinematic | kinematic unicycle | line of sight (1.4) | rate | [`kinematic`] |
 //! | robot | dynamic unicycle (3.12) | Proposition 3.1 | acceleration (3.39), or rate (4.21) | [`robot`] |
+//! | trimming robot | dynamic unicycle (2.1), (2.2) | chapter 2, against its own foot on the path | acceleration, or rate | [`trimming`] |
 //! | underactuated body in space | 6-DOF (4.44), (4.45) | Theorem 4.7 | rate | [`auv`] |
 
 pub mod auv;
 pub mod kinematic;
 pub mod robot;
+pub mod trimming;
 
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::vehicle::environment::Conditions;
@@ -55,6 +57,9 @@ pub const SATURATED: &str = "an actuator was at its limit";
 pub const REFUSED: &str = "the law had no answer, the command before was held";
 /// A divisor of the law was too close to zero and was limited.
 pub const LIMITED: &str = "the law was close to singular, its divisors were limited";
+
+/// The vehicle was at or beyond its path's centre of curvature, where the closest point is not unique.
+pub const SINGULAR: &str = "at the path's centre of curvature, where the closest point jumps";
 
 /// Most actuators have one: the largest effort that they give, either way.
 #[derive(Clone, Copy, Debug, PartialEq)]

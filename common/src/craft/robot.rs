@@ -27,7 +27,7 @@ pub enum SpeedLoop {
 impl SpeedLoop {
     /// The forward acceleration F/m that `demand` asks for, the speed that is wanted, and the rate that is recorded;
     /// nothing if the demand is of the other kind.
-    fn answer(
+    pub(super) fn answer(
         self,
         demand: Demand,
         reference: SpeedReference,
@@ -54,10 +54,10 @@ impl SpeedLoop {
 }
 
 /// See [`SpeedLoop::answer`].
-struct Answer {
-    v_dot: f64,
-    wanted: f64,
-    v_ref: f64,
+pub(super) struct Answer {
+    pub(super) v_dot: f64,
+    pub(super) wanted: f64,
+    pub(super) v_ref: f64,
 }
 
 /// What is held between two evaluations of the law.
@@ -244,7 +244,7 @@ impl Craft for RobotCraft {
 }
 
 /// An effort within ±`limit`, and whether that took something of it.
-fn limited(effort: f64, limit: f64) -> (f64, bool) {
+pub(super) fn limited(effort: f64, limit: f64) -> (f64, bool) {
     if effort.abs() > limit { (limit.copysign(effort), true) } else { (effort, false) }
 }
 

@@ -113,7 +113,8 @@ fn filter(a: &DMatrix<f64>, c: &DMatrix<f64>, disturbances: &Disturbances) -> Re
     positive("the disturbance of the heading", heading)?;
     positive("the disturbance of the torque", torque)?;
     noise.iter().try_for_each(|&sigma| positive("the noise of a measurement", sigma).map(drop))?;
-    let certainty = DMatrix::from_diagonal(&nalgebra::dvector![noise[0], noise[1], noise[2]].map(|sigma| sigma.powi(-2)));
+    let certainty =
+        DMatrix::from_diagonal(&nalgebra::dvector![noise[0], noise[1], noise[2]].map(|sigma| sigma.powi(-2)));
     let w = DMatrix::from_diagonal(&nalgebra::dvector![torque * torque, 0.0, heading * heading, 0.0]);
     let gain = c.transpose() * certainty;
     let y = stabilising(&a.transpose(), &(&gain * c), &w)?;

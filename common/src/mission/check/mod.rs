@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use toml::de::DeTable;
 
-use self::coordination::{check_law, check_told, check_weights};
+use self::coordination::{check_law, check_partners, check_told, check_weights};
 use self::network::{check_links, check_switching};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
@@ -67,6 +67,9 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let links = check_links(faults, file, &ids);
     check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    if let Some(links) = links.as_deref() {
+        check_partners(faults, file, &ids, links);
+    }
     let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = build::nominal_factor(&file.coordination.law);
