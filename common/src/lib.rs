@@ -10,6 +10,7 @@ pub mod following;
 pub mod graph;
 pub mod machine;
 pub mod mission;
+pub mod network;
 pub mod path;
 mod positive;
 pub mod random;

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use nalgebra::{SVector, Vector2};
 
-use super::robot::{SpeedLoop, limited};
-use super::{Craft, LIMITED, Limits, Observation, REFUSED, SATURATED, SINGULAR, Warning};
+use super::robot::SpeedLoop;
+use super::{AT_CENTRE, Craft, LIMITED, Limits, Observation, REFUSED, SATURATED, Warning, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::Errors;
 use crate::following::trimming::{Deviation, TrimmingLaw, Turning};
@@ -119,10 +119,7 @@ impl TrimmingCraft {
 
 impl Craft for TrimmingCraft {
     fn takes(&self) -> DemandKind {
-        match self.speed_loop {
-            SpeedLoop::Acceleration => DemandKind::Acceleration,
-            SpeedLoop::Rate { .. } => DemandKind::Rate,
-        }
+        self.speed_loop.takes()
     }
 
     /// The engine keeps its stuck speed at once (section 2.4: v_i = v₀).
@@ -226,7 +223,7 @@ impl Craft for TrimmingCraft {
     fn warnings(&self) -> Vec<Warning> {
         vec![
             Warning { what: LIMITED, count: self.near_singular },
-            Warning { what: SINGULAR, count: self.singular },
+            Warning { what: AT_CENTRE, count: self.singular },
             Warning { what: SATURATED, count: self.saturated },
             Warning { what: REFUSED, count: self.refused },
         ]

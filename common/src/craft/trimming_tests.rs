@@ -11,7 +11,7 @@ use crate::coordination::recruiting::Gains;
 use crate::coordination::solution_2_3_44::SolutionTwo;
 use crate::coordination::{Demand, FleetLaw, Neighbour, SpeedReference, VehicleLaw};
 use crate::craft::robot::SpeedLoop;
-use crate::craft::{Craft, Limits, SINGULAR};
+use crate::craft::{AT_CENTRE, Craft, Limits};
 use crate::following::decoupling_2_14::Decoupling;
 use crate::following::h2_figure_2_4::Disturbances;
 use crate::following::output_feedback_2_3::OutputFeedback;
@@ -197,7 +197,7 @@ fn lines_and_arcs_are_followed_through_their_joints() {
             alone(&mut craft, 1.0);
             worst = worst.max(craft.observe().e_norm);
         }
-        assert!(worst < 0.1 && craft.observe().xi > 9.0 && count(&craft, SINGULAR) == 0, "{worst}");
+        assert!(worst < 0.1 && craft.observe().xi > 9.0 && count(&craft, AT_CENTRE) == 0, "{worst}");
     }
 }
 
@@ -205,7 +205,7 @@ fn lines_and_arcs_are_followed_through_their_joints() {
 fn across_the_centre_the_foot_jumps_and_is_counted() {
     let mut craft = craft(circle(1.0, Turn::Left), decoupling(0.5), [0.1, 0.0, PI, 0.5]);
     alone(&mut craft, 1.0);
-    assert!(count(&craft, SINGULAR) > 0 && craft.is_sound());
+    assert!(count(&craft, AT_CENTRE) > 0 && craft.is_sound());
     alone(&mut craft, 60.0);
     assert!(craft.is_sound() && craft.observe().e_norm.is_finite());
 }
