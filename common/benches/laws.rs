@@ -11,13 +11,20 @@ use cpf_common::coordination::switching_4_21::Switching;
 use cpf_common::coordination::{CoordinationLaw, Neighbour, SpeedReference};
 use cpf_common::craft::Craft;
 use cpf_common::craft::kinematic::KinematicCraft;
+use cpf_common::craft::marine::{MarineCraft, SideSlip};
 use cpf_common::craft::robot::{RobotCraft, SpeedLoop};
 use cpf_common::following::line_of_sight::LineOfSight;
 use cpf_common::following::proposition_3_1::{Gains, Proposition31};
+use cpf_common::following::proposition_3_2::Proposition32;
+use cpf_common::following::proposition_3_3::Proposition33;
 use cpf_common::path::closest::closest_parameter;
 use cpf_common::path::line::Line;
 use cpf_common::path::sinusoid::Sinusoid;
+use cpf_common::path::spline::Spline;
+use cpf_common::time::Time;
 use cpf_common::vehicle::dynamic_unicycle::{Parameters, State};
+use cpf_common::vehicle::environment::{Current, Disturbances, Environment, NoiseLevels};
+use cpf_common::vehicle::marine;
 use nalgebra::Vector3;
 
 #[global_allocator]
@@ -66,6 +73,42 @@ fn robot_with_3_43(bencher: divan::Bencher) {
 #[divan::bench]
 fn robot_with_4_21(bencher: divan::Bencher) {
     period(bencher, robot(SpeedLoop::Rate { k_0: 2.0 }), Switching::new(0.1).expect("a gain"));
+}
+
+#[divan::bench]
+fn robot_of_proposition_3_2_with_3_43(bencher: divan::Bencher) {
+    let path = Sinusoid::new(1.0, 1.0, 4.0, 0.0, 0.0).expect("a path");
+    let law = Proposition32::new(Gains::default()).expect("gains");
+    let parameters = Parameters { mass: 5.0, inertia: 0.4 };
+    let robot = RobotCraft::new(Arc::new(path), law, SpeedLoop::Acceleration, parameters, State::default(), 0.0);
+    period(bencher, robot.expect("a robot"), SolutionOne::new(1.0).expect("a gain"));
+}
+
+#[divan::bench]
+fn marine_vehicle_of_proposition_3_3_with_4_21(bencher: divan::Bencher) {
+    let path = Sinusoid::new(1.0, 1.0, 40.0, 0.0, 0.0).expect("a path");
+    let law = Proposition33::new(Gains::default(), 1.0).expect("gains");
+    let parameters = marine::Parameters { m_u: 500.0, m_v: 1000.0, m_r: 700.0, d_u: 100.0, d_v: 300.0, d_r: 400.0 };
+    let speed_loop = SpeedLoop::Rate { k_0: 2.0 };
+    let state = marine::State::default();
+    let craft = MarineCraft::new(Arc::new(path), law, speed_loop, SideSlip::NONE, parameters, state, 0.0);
+    period(bencher, craft.expect("a vehicle"), Switching::new(0.1).expect("a gain"));
+}
+
+#[divan::bench]
+fn point_of_a_spline(bencher: divan::Bencher) {
+    let points = (0..200).map(|i| Vector3::new(f64::from(i), f64::from(i * i % 7), 0.0)).collect();
+    let path = Spline::by_length(points, 1.0).expect("a path");
+    bencher.bench_local(|| path.at(black_box(123.4)));
+}
+
+#[divan::bench]
+fn conditions_with_a_current_and_noise(bencher: divan::Bencher) {
+    let noise = NoiseLevels { position: 0.1, heading: 0.01, speed: 0.01, turn_rate: 0.01 };
+    let current = Current { mean: Vector3::x(), tide: None };
+    let disturbances = Disturbances { noise: Some(noise), current: Some(current), stuck: None };
+    let mut environment = Environment::new(disturbances, 1, "v1").expect("disturbed");
+    bencher.bench_local(|| environment.conditions(Time::ZERO, black_box(7)));
 }
 
 #[divan::bench]

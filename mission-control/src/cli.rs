@@ -8,13 +8,14 @@ use std::time::Duration;
 use bus::setup::Endpoint;
 use clap::{Parser, Subcommand, ValueEnum};
 use common::mission::Mission;
+use common::path::geodesy::Place;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::Phase;
 
 use crate::console::Progress;
 use crate::results::{Summary, TheoryRow, diff, export_csv};
 use crate::run::{Failure, Plan, fly};
-use crate::{folder, operator, rehearse, theory, worst};
+use crate::{folder, operator, rehearse, theory, waypoints, worst};
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
 /// over an emulated network, and reports on it.
@@ -116,6 +117,14 @@ enum What {
         alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3)."
     )]
     Worst(WorstArgs),
+    /// Print the lines of a GeoJSON file as paths in metres, to paste into a mission
+    Waypoints {
+        /// The GeoJSON file
+        file: PathBuf,
+        /// Where x, y and z are zero (default: the first position, at the height zero)
+        #[arg(long, value_name = "LON,LAT[,HEIGHT]", value_parser = waypoints::place, allow_hyphen_values = true)]
+        origin: Option<Place>,
+    },
     /// Print the JSON schema of the mission file, for editors
     Schema,
     #[command(hide = true)]
@@ -229,6 +238,7 @@ fn run(what: What) -> Ended {
         What::Diff { a, b } => compare(&a, &b),
         What::Recover { recording, out } => recover(&recording, out),
         What::Worst(args) => search(&args),
+        What::Waypoints { file, origin } => waypoints_of(&file, origin),
         What::Schema => {
             bus::tell!("{:#}", common::mission::schema());
             Ok(ExitCode::SUCCESS)
@@ -241,9 +251,7 @@ fn run(what: What) -> Ended {
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
     let unreadable =
         |error: std::io::Error| End(2, format!("cannot read the mission file {}: {error}", path.display()));
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    std::io::Read::read_to_string(&mut std::io::Read::take(file, MISSION_BYTES + 1), &mut text).map_err(unreadable)?;
+    let text = read_bounded(path).map_err(unreadable)?;
     if text.len() as u64 > MISSION_BYTES {
         let reason = format!("the mission file {} is too long; allowed: {MISSION_BYTES} bytes", path.display());
         return Err(End(2, reason));
@@ -255,6 +263,14 @@ fn load(path: &Path) -> Result<Arc<Mission>, End> {
             format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display()),
         )
     })
+}
+
+/// The text of a file, of which no more is read than shows that it is too long.
+fn read_bounded(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    let file = std::fs::File::open(path)?;
+    std::io::Read::read_to_string(&mut std::io::Read::take(file, MISSION_BYTES + 1), &mut text)?;
+    Ok(text)
 }
 
 fn check(path: &Path, json: bool) -> Ended {
@@ -416,6 +432,14 @@ fn stop(endpoint: &Endpoint) -> Ended {
 fn report(run: &Path) -> Ended {
     folder::report(run, Vec::new()).map_err(|error| End(4, error))?;
     bus::tell!("report: {}", run.join("report.html").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn waypoints_of(file: &Path, origin: Option<Place>) -> Ended {
+    let text = read_bounded(file).map_err(|error| End(2, format!("cannot read {}: {error}", file.display())))?;
+    let section =
+        waypoints::section(&text, origin).map_err(|reason| End(2, format!("{}: {reason}", file.display())))?;
+    bus::tell!("{}", section.trim_end());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -14,4 +14,5 @@ pub mod results;
 pub mod run;
 pub mod simulate;
 pub mod theory;
+pub mod waypoints;
 pub mod worst;
