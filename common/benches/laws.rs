@@ -20,20 +20,28 @@ use cpf_common::coordination::weighted_3_62::Weighted;
 use cpf_common::coordination::{CoordinationLaw, FleetLaw, Neighbour, Own, SpeedReference};
 use cpf_common::craft::Craft;
 use cpf_common::craft::kinematic::KinematicCraft;
+use cpf_common::craft::marine::{MarineCraft, SideSlip};
 use cpf_common::craft::robot::{RobotCraft, SpeedLoop};
 use cpf_common::craft::trimming::TrimmingCraft;
 use cpf_common::following::decoupling_2_14::Decoupling;
-use cpf_common::following::h2_figure_2_4::{Controller, Disturbances, design};
+use cpf_common::following::h2_figure_2_4::{Controller, Disturbances as H2Disturbances, design};
 use cpf_common::following::line_of_sight::LineOfSight;
 use cpf_common::following::output_feedback_2_3::OutputFeedback;
 use cpf_common::following::proposition_3_1::{Gains, Proposition31};
+use cpf_common::following::proposition_3_2::Proposition32;
+use cpf_common::following::proposition_3_3::Proposition33;
 use cpf_common::following::state_transformation_2_19::StateTransformation;
 use cpf_common::following::trimming::{Derivative, Placement, TrimmingLaw};
+use cpf_common::path::Path;
 use cpf_common::path::circle::{Circle, Turn};
 use cpf_common::path::closest::closest_parameter;
 use cpf_common::path::line::Line;
 use cpf_common::path::sinusoid::Sinusoid;
+use cpf_common::path::spline::Spline;
+use cpf_common::time::Time;
 use cpf_common::vehicle::dynamic_unicycle::{Parameters, State};
+use cpf_common::vehicle::environment::{Current, Disturbances, Environment, NoiseLevels};
+use cpf_common::vehicle::marine;
 use nalgebra::Vector3;
 
 #[global_allocator]
@@ -82,7 +90,7 @@ fn decoupling_with_2_33(bencher: divan::Bencher) {
 
 #[divan::bench]
 fn output_feedback_with_2_33(bencher: divan::Bencher) {
-    let law = OutputFeedback::new(0.4, 0.5, Disturbances::default(), Derivative::Exact).expect("a law");
+    let law = OutputFeedback::new(0.4, 0.5, H2Disturbances::default(), Derivative::Exact).expect("a law");
     period_of_learner(bencher, trimming_robot(Box::new(law)), &gateway());
 }
 
@@ -95,7 +103,7 @@ fn state_transformation_with_2_33(bencher: divan::Bencher) {
 /// Done once per change of curvature; this one allocates.
 #[divan::bench]
 fn h_2_design() -> Controller {
-    design(black_box(0.5), 0.4, &Disturbances::default()).expect("a controller")
+    design(black_box(0.5), 0.4, &H2Disturbances::default()).expect("a controller")
 }
 
 /// One control period of 20 ms.
@@ -152,6 +160,42 @@ fn one_row_of(bencher: divan::Bencher, law: &str) {
         vehicle.advance(0.02);
         black_box((demand, vehicle.says(&own)))
     });
+}
+
+#[divan::bench]
+fn robot_of_proposition_3_2_with_3_43(bencher: divan::Bencher) {
+    let path = Sinusoid::new(1.0, 1.0, 4.0, 0.0, 0.0).expect("a path");
+    let law = Proposition32::new(Gains::default()).expect("gains");
+    let parameters = Parameters { mass: 5.0, inertia: 0.4 };
+    let robot = RobotCraft::new(Arc::new(path), law, SpeedLoop::Acceleration, parameters, State::default(), 0.0);
+    period(bencher, robot.expect("a robot"), SolutionOne::new(1.0).expect("a gain"));
+}
+
+#[divan::bench]
+fn marine_vehicle_of_proposition_3_3_with_4_21(bencher: divan::Bencher) {
+    let path = Sinusoid::new(1.0, 1.0, 40.0, 0.0, 0.0).expect("a path");
+    let law = Proposition33::new(Gains::default(), 1.0).expect("gains");
+    let parameters = marine::Parameters { m_u: 500.0, m_v: 1000.0, m_r: 700.0, d_u: 100.0, d_v: 300.0, d_r: 400.0 };
+    let speed_loop = SpeedLoop::Rate { k_0: 2.0 };
+    let state = marine::State::default();
+    let craft = MarineCraft::new(Arc::new(path), law, speed_loop, SideSlip::NONE, parameters, state, 0.0);
+    period(bencher, craft.expect("a vehicle"), Switching::new(0.1).expect("a gain"));
+}
+
+#[divan::bench]
+fn point_of_a_spline(bencher: divan::Bencher) {
+    let points = (0..200).map(|i| Vector3::new(f64::from(i), f64::from(i * i % 7), 0.0)).collect();
+    let path = Spline::by_length(points, 1.0).expect("a path");
+    bencher.bench_local(|| path.at(black_box(123.4)));
+}
+
+#[divan::bench]
+fn conditions_with_a_current_and_noise(bencher: divan::Bencher) {
+    let noise = NoiseLevels { position: 0.1, heading: 0.01, speed: 0.01, turn_rate: 0.01 };
+    let current = Current { mean: Vector3::x(), tide: None };
+    let disturbances = Disturbances { noise: Some(noise), current: Some(current), stuck: None };
+    let mut environment = Environment::new(disturbances, 1, "v1").expect("disturbed");
+    bencher.bench_local(|| environment.conditions(Time::ZERO, black_box(7)));
 }
 
 #[divan::bench]

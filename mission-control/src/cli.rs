@@ -9,6 +9,7 @@ use bus::console::StopFlag;
 use bus::setup::Endpoint;
 use clap::{Parser, Subcommand, ValueEnum};
 use common::mission::Mission;
+use common::path::geodesy::Place;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::Phase;
 
@@ -20,7 +21,7 @@ use crate::sweep::measure::index_of;
 use crate::sweep::plan::{self, Plan as SweepPlan};
 use crate::sweep::setting::Setting;
 use crate::sweep::study::Study;
-use crate::{folder, operator, rehearse, theory, worst};
+use crate::{folder, operator, rehearse, theory, waypoints, worst};
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
 /// over an emulated network, and reports on it.
@@ -161,6 +162,14 @@ enum What {
         alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3)."
     )]
     Worst(WorstArgs),
+    /// Print the lines of a GeoJSON file as paths in metres, to paste into a mission
+    Waypoints {
+        /// The GeoJSON file
+        file: PathBuf,
+        /// Where x, y and z are zero (default: the first position, at the height zero)
+        #[arg(long, value_name = "LON,LAT[,HEIGHT]", value_parser = waypoints::place, allow_hyphen_values = true)]
+        origin: Option<Place>,
+    },
     /// Print the JSON schema of the mission file, for editors
     Schema,
     #[command(hide = true)]
@@ -276,6 +285,7 @@ fn run(what: What) -> Ended {
         What::Diff { a, b } => compare(&a, &b),
         What::Recover { recording, out } => recover(&recording, out),
         What::Worst(args) => search(&args),
+        What::Waypoints { file, origin } => waypoints_of(&file, origin),
         What::Schema => {
             bus::tell!("{:#}", common::mission::schema());
             Ok(ExitCode::SUCCESS)
@@ -287,6 +297,14 @@ fn run(what: What) -> Ended {
 
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
     folder::load(path).map_err(|reason| End(2, reason))
+}
+
+/// The text of a file, of which no more is read than shows that it is too long.
+fn read_bounded(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    let file = std::fs::File::open(path)?;
+    std::io::Read::read_to_string(&mut std::io::Read::take(file, folder::MISSION_BYTES + 1), &mut text)?;
+    Ok(text)
 }
 
 fn check(path: &Path, json: bool) -> Ended {
@@ -561,6 +579,14 @@ fn gallery(missions: &Path, out: &Path) -> Ended {
 fn report(run: &Path) -> Ended {
     folder::report(run, Vec::new()).map_err(|error| End(4, error))?;
     bus::tell!("report: {}", run.join("report.html").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn waypoints_of(file: &Path, origin: Option<Place>) -> Ended {
+    let text = read_bounded(file).map_err(|error| End(2, format!("cannot read {}: {error}", file.display())))?;
+    let section =
+        waypoints::section(&text, origin).map_err(|reason| End(2, format!("{}: {reason}", file.display())))?;
+    bus::tell!("{}", section.trim_end());
     Ok(ExitCode::SUCCESS)
 }
 

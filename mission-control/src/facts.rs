@@ -64,6 +64,8 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         PathChoice::Sinusoid(_) => "sinusoid",
         PathChoice::Chain(_) => "lines and arcs",
         PathChoice::Helix(_) => "helix",
+        PathChoice::Spline(_) => "spline",
+        PathChoice::Geojson(_) => "waypoints",
     });
     VehicleFacts { id: plan.id.clone(), pattern: plan.pattern, path: path.to_string(), planned }
 }

@@ -21,7 +21,7 @@ pub const RECORDING: &str = "recording.mcap";
 pub const MISSION: &str = "mission.toml";
 
 /// Longest mission file (bytes).
-const MISSION_BYTES: u64 = 1 << 20;
+pub(crate) const MISSION_BYTES: u64 = 1 << 20;
 
 /// Reads and checks a mission file.
 ///

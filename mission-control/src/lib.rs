@@ -18,4 +18,5 @@ pub mod run;
 pub mod simulate;
 pub mod sweep;
 pub mod theory;
+pub mod waypoints;
 pub mod worst;

@@ -175,7 +175,7 @@ impl Mission {
         let plan = &self.vehicles[vehicle];
         match (&plan.model, &plan.following) {
             (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) => {
-                Some(build::auv_gains(gains).predicted_bias(&build::auv(*model)))
+                Some(build::auv_gains(gains).predicted_bias(&build::auv(model).ok()?))
             }
             _ => None,
         }
@@ -195,7 +195,7 @@ impl Mission {
         let mut gains = build::auv_gains(gains);
         gains.k_eta = law.a1 * (law.a1 + law.a2) / law.a2;
         let (v_l, stretch) = (self.speed.at(self.end).v_l, plan.path.at(plan.start.xi).r());
-        Some(gains.predicted_rate_type_1(&build::auv(*model), v_l, v_l, stretch))
+        Some(gains.predicted_rate_type_1(&build::auv(model).ok()?, v_l, v_l, stretch))
     }
 
     /// Whether every vehicle can fly at this formation speed.

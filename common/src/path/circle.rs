@@ -72,8 +72,11 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::{Circle, Turn};
+    use crate::following::proposition_3_1::Errors;
     use crate::path::Path;
     use crate::path::check::assert_derivatives_agree;
+    use crate::path::closest::closest_parameter;
+    use crate::path::line::Line;
 
     #[test]
     fn the_parameter_is_the_angle_and_r_the_radius() {
@@ -93,6 +96,26 @@ mod tests {
         assert!((mirrored - left.at(1.3).p).norm() < 1e-15);
         assert!((right.at(1.3).curvature() + 0.5).abs() < 1e-15);
         assert_derivatives_agree(&right, 1.3);
+    }
+
+    /// Section 2.5.1 and Figures 2.9 to 2.11, erratum 2.6: the normal is to the left of the motion, and d_e is positive there.
+    #[test]
+    fn the_distance_is_positive_to_the_left_whichever_way_round() {
+        let centre = Vector3::new(1.0, -2.0, 0.0);
+        let distance = |path: &dyn Path, x: f64, y: f64| {
+            let xi = closest_parameter(path, Vector3::new(x, y, 0.0), true);
+            Errors::of(&path.at(xi), x, y, 0.0).y_e
+        };
+        for (turn, c) in [(Turn::Left, 1.0), (Turn::Right, -1.0)] {
+            let circle = Circle::new(centre, 3.0, turn, 0.4, 1.0).unwrap();
+            assert!((circle.at(0.3).curvature() - c / 3.0).abs() < 1e-15);
+            for (rho, angle) in [(2.5, 0.1f64), (3.5, 2.0), (4.2, -2.5)] {
+                let d_e = distance(&circle, centre.x + rho * angle.cos(), centre.y + rho * angle.sin());
+                assert!((d_e - c * (3.0 - rho)).abs() < 1e-9, "{turn:?} {rho}: {d_e}");
+            }
+        }
+        let up = Line::new(Vector3::new(2.0, 0.0, 0.0), FRAC_PI_2, 1.0).unwrap();
+        assert!((distance(&up, 1.3, 5.0) - 0.7).abs() < 1e-12, "d_e = x_0 - x");
     }
 
     #[test]

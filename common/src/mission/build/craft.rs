@@ -3,14 +3,15 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::file::{
-    AuvModel, DerivativeChoice, FollowingChoice, FollowingType, ModelChoice, Proposition31 as PropFile,
-    Theorem47 as TheoremFile,
+    AuvModel, DerivativeChoice, DynamicUnicycle, FollowingChoice, FollowingType, MarineVehicle, ModelChoice,
+    Proposition31 as PropFile, Proposition33 as Prop33File, Theorem47 as TheoremFile,
 };
 use super::super::{Start, VehiclePlan};
 use crate::coordination::DemandKind;
 use crate::craft::auv::AuvCraft;
 use crate::craft::kinematic::KinematicCraft;
-use crate::craft::robot::{RobotCraft, SpeedLoop};
+use crate::craft::marine::{MarineCraft, SideSlip};
+use crate::craft::robot::{RobotCraft, RobotLaw, SpeedLoop};
 use crate::craft::trimming::TrimmingCraft;
 use crate::craft::{Craft, Limits};
 use crate::following::decoupling_2_14::Decoupling;
@@ -18,12 +19,15 @@ use crate::following::h2_figure_2_4::Disturbances;
 use crate::following::line_of_sight::LineOfSight;
 use crate::following::output_feedback_2_3::OutputFeedback;
 use crate::following::proposition_3_1::{Approach, Gains as RobotGains, Proposition31};
+use crate::following::proposition_3_2::Proposition32;
+use crate::following::proposition_3_3::Proposition33;
 use crate::following::state_transformation_2_19::StateTransformation;
 use crate::following::theorem_4_7::{Gains as AuvGains, TargetMotion, Theorem47};
 use crate::following::trimming::{Derivative, Placement, TrimmingLaw};
 use crate::path::Path;
 use crate::vehicle::auv::{Auv, AuvParameters, AuvState};
 use crate::vehicle::dynamic_unicycle::{Parameters, State};
+use crate::vehicle::marine;
 use crate::vehicle::sirene::sirene;
 
 /// The vehicle of a plan, put at `start`. `nominal_factor` is v_L*/v_L, `fastest` the greatest formation speed.
@@ -42,15 +46,25 @@ pub(in crate::mission) fn craft(
             Ok(Box::new(craft.limited(plan.limits, start.speed, start.yaw)))
         }
         (ModelChoice::DynamicUnicycle(body), FollowingChoice::Proposition31(gains)) => {
-            let parameters = Parameters { mass: body.mass_kg, inertia: body.inertia_kgm2 }.checked()?;
-            let [x, y, _] = start.position;
-            let state = State { x, y, heading: start.yaw, speed: start.speed, turn_rate: 0.0 };
             let law = Proposition31::new(robot_gains(gains))?;
-            let speed_loop = match demand {
-                DemandKind::Acceleration => SpeedLoop::Acceleration,
-                DemandKind::Rate => SpeedLoop::Rate { k_0: gains.k_speed },
+            robot(plan, start, body, law.into(), demand, gains.k_speed)
+        }
+        (ModelChoice::DynamicUnicycle(body), FollowingChoice::Proposition32(gains)) => {
+            let law = Proposition32::new(robot_gains(gains))?;
+            robot(plan, start, body, law.into(), demand, gains.k_speed)
+        }
+        (ModelChoice::MarineVehicle(body), FollowingChoice::Proposition33(gains)) => {
+            let [x, y, _] = start.position;
+            let state = marine::State { x, y, heading: start.yaw, surge: start.speed, ..marine::State::default() };
+            let law = Proposition33::new(marine_gains(gains), gains.k_slip)?;
+            let side_slip = SideSlip {
+                mean: gains.slip_deg.to_radians(),
+                amplitude: gains.slip_amplitude_deg.to_radians(),
+                period: gains.slip_period_s,
             };
-            let craft = RobotCraft::new(plan.path.clone(), law, speed_loop, parameters, state, start.xi)?;
+            let speed_loop = speed_loop(demand, gains.k_speed);
+            let parameters = marine_parameters(body);
+            let craft = MarineCraft::new(plan.path.clone(), law, speed_loop, side_slip, parameters, state, start.xi)?;
             Ok(Box::new(craft.limited(plan.limits)))
         }
         (
@@ -71,7 +85,7 @@ pub(in crate::mission) fn craft(
             Ok(Box::new(craft.limited(plan.limits)))
         }
         (ModelChoice::UnderactuatedAuv(model), FollowingChoice::Theorem47(gains)) => {
-            let auv = limited(auv(*model), &plan.limits)?;
+            let auv = limited(auv(model)?, &plan.limits)?;
             let motion = match gains.kind {
                 FollowingType::I => TargetMotion::TypeI,
                 FollowingType::II => TargetMotion::TypeII,
@@ -112,6 +126,49 @@ fn trimming_law(choice: &FollowingChoice, c_c: f64) -> Result<(Box<dyn TrimmingL
     })
 }
 
+fn speed_loop(demand: DemandKind, k_0: f64) -> SpeedLoop {
+    match demand {
+        DemandKind::Acceleration => SpeedLoop::Acceleration,
+        DemandKind::Rate => SpeedLoop::Rate { k_0 },
+    }
+}
+
+fn robot(
+    plan: &VehiclePlan,
+    start: Start,
+    body: &DynamicUnicycle,
+    law: RobotLaw,
+    demand: DemandKind,
+    k_speed: f64,
+) -> Result<Box<dyn Craft>, String> {
+    let parameters = Parameters { mass: body.mass_kg, inertia: body.inertia_kgm2 }.checked()?;
+    let [x, y, _] = start.position;
+    let state = State { x, y, heading: start.yaw, speed: start.speed, turn_rate: 0.0 };
+    let craft = RobotCraft::new(plan.path.clone(), law, speed_loop(demand, k_speed), parameters, state, start.xi)?;
+    Ok(Box::new(craft.limited(plan.limits)))
+}
+
+fn marine_gains(file: &Prop33File) -> RobotGains {
+    RobotGains {
+        k_1: file.k1,
+        k_3: file.k3,
+        k_4: file.k4,
+        approach: Approach::Arcsine { k_2: file.k2, epsilon_0: file.epsilon_m },
+        ..RobotGains::default()
+    }
+}
+
+fn marine_parameters(file: &MarineVehicle) -> marine::Parameters {
+    marine::Parameters {
+        m_u: file.mass_u_kg,
+        m_v: file.mass_v_kg,
+        m_r: file.inertia_kgm2,
+        d_u: file.drag_u_kgps,
+        d_v: file.drag_v_kgps,
+        d_r: file.drag_r_kgm2ps,
+    }
+}
+
 fn robot_gains(file: &PropFile) -> RobotGains {
     RobotGains {
         k_1: file.k1,
@@ -128,9 +185,24 @@ pub(in crate::mission) fn auv_gains(file: &TheoremFile) -> AuvGains {
 }
 
 /// The rigid body of a choice.
-pub(in crate::mission) fn auv(model: AuvModel) -> Auv {
+pub(in crate::mission) fn auv(model: &AuvModel) -> Result<Auv, String> {
     match model {
-        AuvModel::Sirene => sirene(),
+        AuvModel::Sirene => Ok(sirene()),
+        AuvModel::Parameters(table) => {
+            let limits = *sirene().parameters();
+            Auv::new(AuvParameters {
+                mass: table.mass_t.into(),
+                inertia: table.inertia_tm2.into(),
+                linear_drag: table.linear_drag.into(),
+                quadratic_drag: table.quadratic_drag.into(),
+                linear_spin_drag: table.linear_spin_drag.into(),
+                quadratic_spin_drag: table.quadratic_spin_drag.into(),
+                weight: table.weight_kn,
+                buoyancy: table.buoyancy_kn.unwrap_or(table.weight_kn),
+                centre_of_buoyancy: table.centre_of_buoyancy_m.into(),
+                ..limits
+            })
+        }
     }
 }
 

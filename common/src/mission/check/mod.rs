@@ -164,6 +164,9 @@ mod tests {
             ("fig-1-9", include_str!("../../../../missions/thesis/fig-1-9.toml")),
             ("fig-1-10", include_str!("../../../../missions/thesis/fig-1-10.toml")),
             ("fig-3-7", FIG_3_7),
+            ("prop-3-2", include_str!("../../../../missions/thesis/prop-3-2.toml")),
+            ("prop-3-3", include_str!("../../../../missions/thesis/prop-3-3.toml")),
+            ("waypoints", include_str!("../../../../missions/waypoints.toml")),
             ("fig-3-9", include_str!("../../../../missions/thesis/fig-3-9.toml")),
             ("fig-4-2", include_str!("../../../../missions/thesis/fig-4-2.toml")),
         ] {
@@ -245,6 +248,43 @@ mod tests {
     fn a_law_that_does_not_fit_names_both_sides() {
         let found = faults_with("{ theorem47 = { kind = \"II\" } }", "{ proposition31 = {} }");
         assert!(found.iter().any(|l| l.contains("proposition31 with underactuated_auv")), "{found:?}");
+    }
+
+    #[test]
+    fn laws_of_other_vehicles_and_waypoints_that_are_no_path_are_refused() {
+        let marine = include_str!("../../../../missions/thesis/prop-3-3.toml");
+        let lanes = include_str!("../../../../missions/waypoints.toml");
+        for (text, old, new, expected) in [
+            (marine, "{ marine_vehicle = {} }", "{ dynamic_unicycle = {} }", "proposition33 with dynamic_unicycle"),
+            (
+                marine,
+                "{ proposition33 = { slip_deg = 20.0 } }",
+                "{ proposition31 = {} }",
+                "proposition31 with marine_vehicle",
+            ),
+            (marine, "slip_deg = 20.0", "k_slip = 0.0", "vehicles[1].following: found the gain of the side-slip"),
+            (
+                marine,
+                "{ marine_vehicle = {} }",
+                "{ marine_vehicle = { mass_v_kg = 0.0 } }",
+                "found m_v must be positive",
+            ),
+            (FIG_3_7, "{ proposition31 = {} }", "{ proposition33 = {} }", "allowed: proposition31 or proposition32"),
+            (lanes, "xi = [0, 31,", "xi = [0, 0,", "vehicles[0].path.geojson: found the step of xi after waypoint 0"),
+            (lanes, "xi = [0, 31,", "rate_m = 1.0\nxi = [0, 31,", "both rate_m and xi"),
+            (lanes, "latitude_deg = 38.689", "latitude_deg = 138.0", "longitude first"),
+            (lanes, "\"LineString\"", "\"Point\"", "vehicles[0].path.geojson: found not GeoJSON"),
+            (
+                lanes,
+                "{ underactuated_auv = \"sirene\" }",
+                "{ dynamic_unicycle = {} }",
+                "theorem47 with dynamic_unicycle",
+            ),
+        ] {
+            assert!(text.contains(old), "{old}");
+            let found = faults(&text.replacen(old, new, 1));
+            assert!(found.iter().any(|line| line.contains(expected)), "{new}: {found:?}");
+        }
     }
 
     #[test]

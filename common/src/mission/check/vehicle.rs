@@ -42,12 +42,12 @@ pub(super) fn check_vehicle(
         faults.fault(
             &key,
             "no model",
-            "a model here or in [fleet]: kinematic_unicycle, dynamic_unicycle or underactuated_auv",
+            "a model here or in [fleet]: kinematic_unicycle, dynamic_unicycle, marine_vehicle or underactuated_auv",
         );
     }
     if following.is_none() {
-        let allowed = "a following law here or in [fleet]: line_of_sight, proposition31, decoupling, output_feedback, state_transformation or \
-                       theorem47";
+        let allowed = "a following law here or in [fleet]: line_of_sight, decoupling, output_feedback, state_transformation, \
+                       proposition31, proposition32, proposition33 or theorem47";
         faults.fault(&key, "no following", allowed);
     }
     let disturbances = check_disturbances(faults, file, index);
@@ -105,6 +105,8 @@ fn path_name(path: &PathChoice) -> &'static str {
         PathChoice::Sinusoid(_) => "sinusoid",
         PathChoice::Chain(_) => "chain",
         PathChoice::Helix(_) => "helix",
+        PathChoice::Spline(_) => "spline",
+        PathChoice::Geojson(_) => "geojson",
     }
 }
 
@@ -125,15 +127,19 @@ fn check_fit(
         | (
             ModelChoice::DynamicUnicycle(_),
             FollowingChoice::Proposition31(_)
+            | FollowingChoice::Proposition32(_)
             | FollowingChoice::Decoupling(_)
             | FollowingChoice::OutputFeedback(_)
             | FollowingChoice::StateTransformation(_),
         )
+        | (ModelChoice::MarineVehicle(_), FollowingChoice::Proposition33(_))
         | (ModelChoice::UnderactuatedAuv(_), FollowingChoice::Theorem47(_)) => (true, ""),
         (ModelChoice::KinematicUnicycle, _) => (false, "line_of_sight with kinematic_unicycle"),
-        (ModelChoice::DynamicUnicycle(_), _) => {
-            (false, "proposition31, decoupling, output_feedback or state_transformation with dynamic_unicycle")
-        }
+        (ModelChoice::DynamicUnicycle(_), _) => (
+            false,
+            "proposition31, proposition32, decoupling, output_feedback or state_transformation with dynamic_unicycle",
+        ),
+        (ModelChoice::MarineVehicle(_), _) => (false, "proposition33 with marine_vehicle"),
         (ModelChoice::UnderactuatedAuv(_), _) => (false, "theorem47 with underactuated_auv"),
     };
     if !fits {
@@ -142,7 +148,7 @@ fn check_fit(
         return false;
     }
     let mut ok = true;
-    let takes_acceleration = matches!(model, ModelChoice::DynamicUnicycle(_));
+    let takes_acceleration = matches!(model, ModelChoice::DynamicUnicycle(_) | ModelChoice::MarineVehicle(_));
     if let Some(law) = law
         && law.kind() == DemandKind::Acceleration
         && !takes_acceleration
@@ -172,13 +178,14 @@ fn check_fit(
         && chain.segments.iter().any(|segment| matches!(segment, SegmentChoice::Arc(_)))
         && chain.segments.len() > 1
     {
-        let allowed = "a path with a continuous curvature for theorem47: line, circle, sinusoid or helix";
+        let allowed =
+            "a path with a continuous curvature for theorem47: line, circle, sinusoid, helix, spline or geojson";
         faults.fault(&path_key, "a chain, whose curvature jumps from piece to piece", allowed);
         ok = false;
     }
     if !matches!(model, ModelChoice::UnderactuatedAuv(_)) && !crate::path::shape::is_planar(path) {
         let found = format!("a path that leaves the plane for a {}", model_name(model));
-        faults.fault(&path_key, found, "a line, circle, sinusoid or chain");
+        faults.fault(&path_key, found, "a line, circle, sinusoid or chain, or waypoints of one height");
         ok = false;
     }
     ok
@@ -226,6 +233,7 @@ pub(super) fn model_name(model: &ModelChoice) -> &'static str {
     match model {
         ModelChoice::KinematicUnicycle => "kinematic_unicycle",
         ModelChoice::DynamicUnicycle(_) => "dynamic_unicycle",
+        ModelChoice::MarineVehicle(_) => "marine_vehicle",
         ModelChoice::UnderactuatedAuv(_) => "underactuated_auv",
     }
 }
@@ -237,6 +245,8 @@ fn following_name(following: &FollowingChoice) -> &'static str {
         FollowingChoice::OutputFeedback(_) => "output_feedback",
         FollowingChoice::StateTransformation(_) => "state_transformation",
         FollowingChoice::Proposition31(_) => "proposition31",
+        FollowingChoice::Proposition32(_) => "proposition32",
+        FollowingChoice::Proposition33(_) => "proposition33",
         FollowingChoice::Theorem47(_) => "theorem47",
     }
 }

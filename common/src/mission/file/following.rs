@@ -17,6 +17,10 @@ pub enum FollowingChoice {
     StateTransformation(StateTransformation),
     /// Proposition 3.1 with Appendix 6.1.
     Proposition31(Proposition31),
+    /// Proposition 3.2: Proposition 3.1 without the coupling Δ.
+    Proposition32(Proposition31),
+    /// Proposition 3.3 for fully actuated marine vehicles, with erratum 3.3.
+    Proposition33(Proposition33),
     /// Theorem 4.7, with the roll treatment of docs/errata.md.
     Theorem47(Theorem47),
 }
@@ -136,6 +140,50 @@ pub struct Proposition31 {
 impl Default for Proposition31 {
     fn default() -> Self {
         Proposition31 { k1: 1.0, k2: 0.6, k3: 1.0, k4: 1.0, epsilon_m: 0.3, k_speed: 2.0 }
+    }
+}
+
+/// Gains of Proposition 3.3, and the side-slip that is wanted: mean + amplitude sin(2π t / period).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct Proposition33 {
+    /// Heading gain k_1 (1/s).
+    pub k1: f64,
+    /// Approach-angle gain k_2, above 0 and at most 1.
+    pub k2: f64,
+    /// Along-path gain k_3 of the virtual target (1/s).
+    pub k3: f64,
+    /// Turn-rate gain k_4 (1/s).
+    pub k4: f64,
+    /// Length ε_0 over which the approach angle builds up (m).
+    pub epsilon_m: f64,
+    /// Gain of the speed loop when the coordination law gives a rate (1/s).
+    pub k_speed: f64,
+    /// Gain k_0 of the side-slip (1/s).
+    pub k_slip: f64,
+    /// Mean of the side-slip, positive to the left (deg).
+    pub slip_deg: f64,
+    /// Amplitude of the side-slip (deg).
+    pub slip_amplitude_deg: f64,
+    /// Period of the side-slip (s).
+    pub slip_period_s: f64,
+}
+
+impl Default for Proposition33 {
+    fn default() -> Self {
+        let Proposition31 { k1, k2, k3, k4, epsilon_m, k_speed } = Proposition31::default();
+        Proposition33 {
+            k1,
+            k2,
+            k3,
+            k4,
+            epsilon_m,
+            k_speed,
+            k_slip: 1.0,
+            slip_deg: 0.0,
+            slip_amplitude_deg: 0.0,
+            slip_period_s: 60.0,
+        }
     }
 }
 

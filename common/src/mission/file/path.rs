@@ -17,6 +17,49 @@ pub enum PathChoice {
     Chain(ChainPath),
     /// A helix about a vertical axis, section 4.6.
     Helix(HelixPath),
+    /// A smooth curve through waypoints.
+    Spline(SplinePath),
+    /// A smooth curve through the waypoints of a GeoJSON LineString.
+    Geojson(GeojsonPath),
+}
+
+/// A smooth curve through waypoints, straight on before the first and after the last.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct SplinePath {
+    /// The waypoints, [east, north] or [east, north, up] (m).
+    pub waypoints_m: Vec<Vec<f64>>,
+    /// Metres per unit of xi, nearly; 1 if absent. Not with `xi`.
+    pub rate_m: Option<f64>,
+    /// xi at each waypoint, increasing: vehicles with the same values are abreast at their waypoints.
+    pub xi: Option<Vec<f64>>,
+}
+
+/// A smooth curve through the waypoints of a GeoJSON LineString.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct GeojsonPath {
+    /// The GeoJSON text: a LineString, or features that contain it; positions are longitude, latitude and, if given, height
+    /// over the ellipsoid, negative for a depth.
+    pub text: String,
+    /// Property `name` of the LineString, if there are several.
+    pub line: Option<String>,
+    /// Where x, y and z are zero.
+    pub origin: OriginSection,
+    /// Metres per unit of xi, nearly; 1 if absent. Not with `xi`.
+    pub rate_m: Option<f64>,
+    /// xi at each waypoint, increasing: vehicles with the same values are abreast at their waypoints.
+    pub xi: Option<Vec<f64>>,
+}
+
+/// A place on the globe, WGS 84.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OriginSection {
+    /// Longitude, positive to the east (deg).
+    pub longitude_deg: f64,
+    /// Latitude, positive to the north (deg).
+    pub latitude_deg: f64,
+    /// Height over the ellipsoid (m).
+    #[serde(default)]
+    pub height_m: f64,
 }
 
 /// A straight line.

@@ -90,6 +90,8 @@ pub enum ModelChoice {
     KinematicUnicycle,
     /// Wheeled robot with mass and inertia, (3.12).
     DynamicUnicycle(DynamicUnicycle),
+    /// Marine vehicle with forces ahead and aside, in the plane, (3.28).
+    MarineVehicle(MarineVehicle),
     /// Underactuated rigid body in 3-D, (4.44) and (4.45).
     UnderactuatedAuv(AuvModel),
 }
@@ -110,10 +112,66 @@ impl Default for DynamicUnicycle {
     }
 }
 
+/// Masses and drag of a fully actuated marine vehicle, added mass included. The defaults are of a robot of half a tonne.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct MarineVehicle {
+    /// Mass m_u ahead (kg).
+    pub mass_u_kg: f64,
+    /// Mass m_v aside (kg).
+    pub mass_v_kg: f64,
+    /// Moment of inertia m_r about the vertical (kg m²).
+    pub inertia_kgm2: f64,
+    /// Drag d_u ahead (kg/s).
+    pub drag_u_kgps: f64,
+    /// Drag d_v aside (kg/s).
+    pub drag_v_kgps: f64,
+    /// Drag d_r on turning (kg m²/s).
+    pub drag_r_kgm2ps: f64,
+}
+
+impl Default for MarineVehicle {
+    fn default() -> Self {
+        MarineVehicle {
+            mass_u_kg: 500.0,
+            mass_v_kg: 1000.0,
+            inertia_kgm2: 700.0,
+            drag_u_kgps: 100.0,
+            drag_v_kgps: 300.0,
+            drag_r_kgm2ps: 400.0,
+        }
+    }
+}
+
 /// Parameter set of an underactuated rigid body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AuvModel {
     /// Sirene-like, derived (see `common::vehicle`).
     Sirene,
+    /// A table of its own.
+    Parameters(AuvTable),
+}
+
+/// Parameters of an underactuated rigid body, along or about its axes x (ahead), y and z; added mass included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AuvTable {
+    /// Diagonal of M (t).
+    pub mass_t: [f64; 3],
+    /// Diagonal of J (t m²).
+    pub inertia_tm2: [f64; 3],
+    /// Linear drag (kN s/m).
+    pub linear_drag: [f64; 3],
+    /// Quadratic drag (kN s²/m²).
+    pub quadratic_drag: [f64; 3],
+    /// Linear drag on turning (kN m s).
+    pub linear_spin_drag: [f64; 3],
+    /// Quadratic drag on turning (kN m s²).
+    pub quadratic_spin_drag: [f64; 3],
+    /// Weight W (kN).
+    pub weight_kn: f64,
+    /// Buoyancy B (kN); the weight if absent.
+    pub buoyancy_kn: Option<f64>,
+    /// r_B (m); a negative z is righting (erratum 4.17).
+    pub centre_of_buoyancy_m: [f64; 3],
 }
