@@ -45,10 +45,76 @@ pub enum Fate {
     Lost,
     /// The link was down when it should have arrived.
     LinkDown,
-    /// The queue of the link was full.
+    /// The queue of the link, or of the sender, was full.
     QueueFull,
     /// Still under way when the mission ended.
     InFlight,
+    /// The receiver was too far away.
+    OutOfRange,
+    /// The receiver was speaking itself.
+    HalfDuplex,
+    /// Another message arrived at the receiver at the same time.
+    Collision,
+    /// Handed over with a flipped bit, by which the receiver knows it for garbage.
+    Corrupt,
+    /// A second copy, which the network made, was handed to the receiver.
+    Copied,
+    /// A second copy did not get there, whyever.
+    CopyDropped,
+    /// A second copy was still under way when the mission ended.
+    CopyInFlight,
+}
+
+impl Fate {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Fate; 12] = [
+        Fate::Delivered,
+        Fate::Lost,
+        Fate::LinkDown,
+        Fate::QueueFull,
+        Fate::InFlight,
+        Fate::OutOfRange,
+        Fate::HalfDuplex,
+        Fate::Collision,
+        Fate::Corrupt,
+        Fate::Copied,
+        Fate::CopyDropped,
+        Fate::CopyInFlight,
+    ];
+
+    /// The causes for which a message is dropped.
+    pub const DROPS: [Fate; 7] = [
+        Fate::Lost,
+        Fate::OutOfRange,
+        Fate::LinkDown,
+        Fate::QueueFull,
+        Fate::HalfDuplex,
+        Fate::Collision,
+        Fate::Corrupt,
+    ];
+
+    /// Whether it is that of a second copy, which nobody sent.
+    pub fn is_of_copy(self) -> bool {
+        matches!(self, Fate::Copied | Fate::CopyDropped | Fate::CopyInFlight)
+    }
+
+    /// Its name, the same as in a recording.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Fate::Delivered => "delivered",
+            Fate::Lost => "lost",
+            Fate::LinkDown => "link_down",
+            Fate::QueueFull => "queue_full",
+            Fate::InFlight => "in_flight",
+            Fate::OutOfRange => "out_of_range",
+            Fate::HalfDuplex => "half_duplex",
+            Fate::Collision => "collision",
+            Fate::Corrupt => "corrupt",
+            Fate::Copied => "copied",
+            Fate::CopyDropped => "copy_dropped",
+            Fate::CopyInFlight => "copy_in_flight",
+        }
+    }
 }
 
 /// One message on one directed link, written when its fate is known.
@@ -66,6 +132,40 @@ pub struct MessageRow {
     /// When it was to arrive.
     pub due_ns: i64,
     pub fate: Fate,
+}
+
+/// What became of a message, without names: what the emulator hands on for every message of a fleet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settled {
+    /// When the fate was decided \[ns\].
+    pub t_ns: i64,
+    /// Index of the link among the mission's.
+    pub link: usize,
+    /// Number of the message on its link, from 0.
+    pub seq: u64,
+    /// When the emulator took it \[ns\].
+    pub sent_ns: i64,
+    /// When it was to arrive \[ns\].
+    pub due_ns: i64,
+    /// Its fate.
+    pub fate: Fate,
+    /// In real time, for a message that was delivered: how much later than due \[ns of wall clock\].
+    pub late_ns: Option<i64>,
+}
+
+impl Settled {
+    /// The row of `links.csv`, for a link between these two.
+    pub fn message(&self, from: &Name, to: &Name) -> MessageRow {
+        let Settled { t_ns, seq, sent_ns, due_ns, fate, .. } = *self;
+        MessageRow { t_ns, from: from.clone(), to: to.clone(), seq, sent_ns, due_ns, fate }
+    }
+
+    /// The row that compares the commanded delay with the achieved one, if the clock is a real one.
+    pub fn achieved(&self, from: &Name, to: &Name) -> Option<AchievedRow> {
+        let Settled { t_ns, seq, sent_ns, due_ns, .. } = *self;
+        let commanded_ns = due_ns - sent_ns;
+        self.late_ns.map(|late_ns| AchievedRow { t_ns, from: from.clone(), to: to.clone(), seq, commanded_ns, late_ns })
+    }
 }
 
 /// A directed link came up or went down.

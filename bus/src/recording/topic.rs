@@ -98,15 +98,24 @@ impl Topic {
         })
     }
 
-    /// Appends the row as JSON.
+    /// Appends the row, whose numbers are finite, as JSON.
     pub(super) fn encode(row: &Row, json: &mut Vec<u8>) -> serde_json::Result<()> {
         match row {
             Row::Exact(Record::Speed(row)) => serde_json::to_writer(json, row),
             Row::Exact(Record::Topology(row)) => serde_json::to_writer(json, row),
-            Row::Exact(Record::State(row)) => serde_json::to_writer(json, row),
-            Row::Exact(Record::Message(row)) => serde_json::to_writer(json, row),
             Row::Exact(Record::Warning(row)) => serde_json::to_writer(json, row),
-            Row::Clock(ClockRecord::Achieved(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::State(row)) => {
+                super::json::state(row, json);
+                Ok(())
+            }
+            Row::Exact(Record::Message(row)) => {
+                super::json::message(row, json);
+                Ok(())
+            }
+            Row::Clock(ClockRecord::Achieved(row)) => {
+                super::json::achieved(row, json);
+                Ok(())
+            }
             Row::Clock(ClockRecord::Ticks(row)) => serde_json::to_writer(json, row),
             Row::Clock(ClockRecord::Note(row)) => serde_json::to_writer(json, row),
         }
@@ -123,7 +132,7 @@ pub fn topic_of(row: &Row) -> Cow<'static, str> {
 }
 
 /// When the row was written, in mission time \[ns\].
-pub(super) fn time_of(row: &Row) -> i64 {
+pub(crate) fn time_of(row: &Row) -> i64 {
     match row {
         Row::Exact(record) => record.t_ns(),
         Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,

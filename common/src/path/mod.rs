@@ -15,11 +15,12 @@
 //! Waypoints on the globe come from [`geojson`] by [`geodesy`].
 //!
 //! What follows from p', p'' and p''' (R, heading, curvature) is in [`geometry`], the point closest to a vehicle in
-//! [`closest`], and what a law may ask of a path as a whole in [`shape`].
+//! [`closest`], the same followed under way in [`foot`], and what a law may ask of a path as a whole in [`shape`].
 
 pub mod chain;
 pub mod circle;
 pub mod closest;
+pub mod foot;
 pub mod geodesy;
 pub mod geojson;
 pub mod geometry;

@@ -10,17 +10,19 @@
 //! | [`diff()`] | *equal*, or the first row in which two runs part |
 
 mod diff;
+pub(crate) mod drawing;
 mod export;
 mod facts;
 mod figures;
 mod folder;
-mod network;
-mod report;
+pub(crate) mod network;
+pub(crate) mod report;
 mod series;
-mod statistics;
+pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
+mod trace;
 
 pub use diff::{Outcome, Side, diff, origins_differ};
 pub use export::{Exporter, export_csv};
@@ -35,3 +37,4 @@ pub use summary::{
     ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
     Summary, VehicleSummary, summarise, summarise_clock,
 };
+pub use trace::network_section;
