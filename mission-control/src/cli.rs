@@ -299,11 +299,14 @@ fn load(path: &Path) -> Result<Arc<Mission>, End> {
     folder::load(path).map_err(|reason| End(2, reason))
 }
 
-/// The text of a file, of which no more is read than shows that it is too long.
+/// Longest GeoJSON file (bytes); of a longer one the begin is read, which is no GeoJSON.
+const LONGEST_GEOJSON: u64 = 64 << 20;
+
+/// The text of a file, but not more of it than that.
 fn read_bounded(path: &Path) -> std::io::Result<String> {
     let mut text = String::new();
     let file = std::fs::File::open(path)?;
-    std::io::Read::read_to_string(&mut std::io::Read::take(file, folder::MISSION_BYTES + 1), &mut text)?;
+    std::io::Read::read_to_string(&mut std::io::Read::take(file, LONGEST_GEOJSON), &mut text)?;
     Ok(text)
 }
 

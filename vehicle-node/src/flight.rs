@@ -475,9 +475,10 @@ mod tests {
         let rows = |keys: &str| {
             let mut flight = Flight::new(mission_with(keys), 0, None).expect("flies");
             let mut rows = Vec::new();
-            flight.run_until(Time::from_secs(0.5), [], |_, output| match output {
-                FlightOutput::Record(Row::Exact(Record::State(row))) => rows.push(row),
-                _ => {}
+            flight.run_until(Time::from_secs(0.5), [], |_, output| {
+                if let FlightOutput::Record(Row::Exact(Record::State(row))) = output {
+                    rows.push(row);
+                }
             });
             rows
         };
@@ -497,9 +498,10 @@ mod tests {
         let mission = Arc::new(Mission::parse("m.toml", &text).expect("sound"));
         let mut flight = Flight::new(mission, 0, None).expect("flies");
         let mut warnings = Vec::new();
-        flight.run_until(Time::from_secs(5.0), [], |at, output| match output {
-            FlightOutput::Record(Row::Exact(Record::Warning(row))) => warnings.push((at, row)),
-            _ => {}
+        flight.run_until(Time::from_secs(5.0), [], |at, output| {
+            if let FlightOutput::Record(Row::Exact(Record::Warning(row))) = output {
+                warnings.push((at, row));
+            }
         });
         let [(at, row)] = &warnings[..] else { panic!("one warning, not {warnings:?}") };
         assert_eq!((at.secs(), row.t_ns, &*row.source), (2.0, 2_000_000_000, "auv1"));
