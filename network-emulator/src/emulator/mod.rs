@@ -40,7 +40,6 @@ use self::books::unsent;
 use self::parcel::{Parcel, UnderWay};
 use self::sender::Sender;
 use self::wire::{Wire, flip};
-use crate::ledger::Ledger;
 
 /// A vehicle put bytes on the air.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::ledger::Ledger;
 
 /// A mission of three vehicles on lines whose network is given.
 fn mission(network: &str) -> Arc<Mission> {
