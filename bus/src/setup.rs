@@ -7,6 +7,7 @@
 //! | default-deny access control on every listening session | what is not listed below does not cross |
 //! | lease 2 s on both sides | each side's lease is what the *other* side waits before it believes a silence |
 //! | 16 batches for each plane's queue | a burst must not become a loss, and the mission plane never blocks |
+//! | the hub's sessions do not wait for room for a state | one slow participant would hold up all others |
 //! | at most 64 KiB per message received | the default is 1 GiB |
 //!
 //! Sessions run on Zenoh's own threads, so everything here is called from plain threads and from no async runtime.
@@ -198,6 +199,8 @@ fn router_config(endpoint: &Endpoint, rules: &[Rule]) -> Result<Config> {
         // A router otherwise sleeps half a second in open().
         ("scouting/delay", "0".to_owned()),
         ("timestamping/enabled", "false".to_owned()),
+        // A state for a participant that takes none is dropped at once: nobody else's may wait for it.
+        ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0".to_owned()),
         // Connections that say nothing must not keep the others out.
         ("transport/unicast/accept_pending", "1000".to_owned()),
         ("transport/unicast/accept_timeout", "2000".to_owned()),

@@ -242,16 +242,17 @@ impl Switchboard {
         }
     }
 
-    /// Sends what was posted, without waiting for anybody; to how many participants.
+    /// Sends what was posted, without waiting for anybody; how many messages.
     ///
     /// What a participant cannot be sent is dropped, as the state plane may.
     pub fn flush(&mut self) -> usize {
-        for line in &self.addressed {
-            Switchboard::dispatch(&self.lines, *line, &mut self.posted[line.index()]);
+        let mut messages = 0;
+        for line in self.addressed.drain(..) {
+            let posted = &mut self.posted[line.index()];
+            messages += posted.messages as usize;
+            Switchboard::dispatch(&self.lines, line, posted);
         }
-        let count = self.addressed.len();
-        self.addressed.clear();
-        count
+        messages
     }
 
     /// Whether nothing waits to be sent.
@@ -276,6 +277,12 @@ impl Switchboard {
     /// The identity of a line's participant.
     pub fn id(&self, line: LineId) -> Option<String> {
         self.lines.get(line).map(|line| line.id.clone())
+    }
+
+    /// State-plane packets that were dropped because the program did not empty its queue, over all lines.
+    pub fn dropped(&self) -> u64 {
+        let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner);
+        lines.iter().map(|line| line.tally.state_dropped.get()).sum()
     }
 
     /// What has passed on a line so far, over all of its sessions.

@@ -15,6 +15,7 @@ pub mod path;
 mod positive;
 pub mod random;
 pub mod record;
+pub mod riccati;
 pub mod theory;
 pub mod time;
 pub mod vehicle;

@@ -5,15 +5,21 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use bus::console::StopFlag;
 use bus::setup::Endpoint;
 use clap::{Parser, Subcommand, ValueEnum};
 use common::mission::Mission;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::Phase;
 
-use crate::console::Progress;
+use crate::console::{Count, Progress};
+use crate::gallery::{GALLERY, Gallery};
 use crate::results::{Summary, TheoryRow, diff, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
+use crate::sweep::measure::index_of;
+use crate::sweep::plan::{self, Plan as SweepPlan};
+use crate::sweep::setting::Setting;
+use crate::sweep::study::Study;
 use crate::{folder, operator, rehearse, theory, worst};
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
@@ -52,12 +58,51 @@ enum What {
         /// The run folder (default: runs/MISSION-TIME)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        /// Another value for a key of the mission file, such as network.loss=0.3; may be repeated
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        sets: Vec<String>,
+        /// Another seed
+        #[arg(long)]
+        seed: Option<u64>,
         /// JSON for a pipe
         #[arg(long)]
         json: bool,
     },
+    /// Fly a mission with every combination of some values, each several times, and sum up what came of it
+    Sweep {
+        /// The mission file
+        mission: PathBuf,
+        /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated
+        #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
+        sets: Vec<String>,
+        /// Runs of every combination, each with a seed of its own
+        #[arg(long, value_name = "TIMES", default_value = "1")]
+        repeat: u32,
+        /// The number that is drawn; a column of runs.csv
+        #[arg(long, value_name = "COLUMN", default_value = "coordination_last")]
+        measure: String,
+        /// The sweep's folder; the same command goes on with what is there (default: runs/sweep-MISSION)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Fly the sweeps of a study and write its page
+    Study {
+        /// The study file
+        study: PathBuf,
+        /// The study's folder; the same command goes on with what is there (default: runs/study-NAME)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Fly a mission as real processes: one per vehicle, one for the network between them
     Run(RunArgs),
+    /// Fly all missions of a folder and show them on one page, with the numbers expected of them (exit code 1: one disagrees)
+    Gallery {
+        /// The folder: missions, and gallery.toml, which says what figures they make
+        missions: PathBuf,
+        /// Where the page goes
+        #[arg(long, value_name = "DIR", default_value = "runs/gallery")]
+        out: PathBuf,
+    },
     /// Set the formation speed of the fleet under way
     Speed {
         /// The speed v_L (units of xi per s)
@@ -196,9 +241,6 @@ enum Format {
     Network,
 }
 
-/// Longest mission file (bytes).
-const MISSION_BYTES: u64 = 1 << 20;
-
 /// How long a single command waits for the fleet to appear.
 const COMMAND_PATIENCE: Duration = Duration::from_secs(3);
 
@@ -221,8 +263,11 @@ pub fn main(cli: Cli) -> ExitCode {
 fn run(what: What) -> Ended {
     match what {
         What::Check { mission, json } => check(&mission, json),
-        What::Simulate { mission, out, json } => simulate(&mission, out.as_deref(), json),
+        What::Simulate { mission, out, sets, seed, json } => simulate(&mission, out.as_deref(), &sets, seed, json),
+        What::Sweep { mission, sets, repeat, measure, out } => sweep(&mission, &sets, repeat, &measure, out),
+        What::Study { study: path, out } => study(&path, out),
         What::Run(args) => run_fleet(args),
+        What::Gallery { missions, out } => gallery(&missions, &out),
         What::Speed { speed, fleet } => speed_command(speed, &fleet.attach),
         What::Status { json, fleet } => status(json, &fleet.attach),
         What::Stop { fleet } => stop(&fleet.attach),
@@ -241,22 +286,7 @@ fn run(what: What) -> Ended {
 }
 
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
-    let unreadable =
-        |error: std::io::Error| End(2, format!("cannot read the mission file {}: {error}", path.display()));
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    std::io::Read::read_to_string(&mut std::io::Read::take(file, MISSION_BYTES + 1), &mut text).map_err(unreadable)?;
-    if text.len() as u64 > MISSION_BYTES {
-        let reason = format!("the mission file {} is too long; allowed: {MISSION_BYTES} bytes", path.display());
-        return Err(End(2, reason));
-    }
-    Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
-        let n = faults.list.len();
-        End(
-            2,
-            format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display()),
-        )
-    })
+    folder::load(path).map_err(|reason| End(2, reason))
 }
 
 fn check(path: &Path, json: bool) -> Ended {
@@ -310,11 +340,88 @@ fn print_theory(rows: &[TheoryRow]) {
     }
 }
 
-fn simulate(path: &Path, out: Option<&Path>, json: bool) -> Ended {
-    let mission = load(path)?;
+fn simulate(path: &Path, out: Option<&Path>, sets: &[String], seed: Option<u64>, json: bool) -> Ended {
+    let mission = changed(load(path)?, sets, seed).map_err(|reason| End(2, reason))?;
     warn(&theory::rows(&mission, None));
     let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
     tell(&mission, &folder, outcome.phase, &summary, &[], json)
+}
+
+/// The mission with some of its keys at other values.
+fn changed(mission: Arc<Mission>, sets: &[String], seed: Option<u64>) -> Result<Arc<Mission>, String> {
+    let mut settings = sets.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
+    if let Some(several) = settings.iter().find(|setting| setting.values.len() > 1) {
+        return Err(format!("--set {}: found several values; allowed: one (several are for sweep)", several.key));
+    }
+    settings.extend(seed.map(|seed| Setting::parse(&format!("seed={seed}"))).transpose()?);
+    if settings.is_empty() {
+        return Ok(mission);
+    }
+    let changes: Vec<_> = settings.iter().map(|setting| (setting.key.as_str(), &setting.values[0])).collect();
+    let text = plan::apply(&mission.text, &changes)?;
+    Mission::parse(folder::MISSION, &text).map(Arc::new).map_err(|faults| faults.to_string())
+}
+
+fn sweep(path: &Path, sets: &[String], repeat: u32, measure: &str, out: Option<PathBuf>) -> Ended {
+    let refused = |reason: String| End(2, reason);
+    let mission = load(path)?;
+    let out = out.unwrap_or_else(|| PathBuf::from(format!("runs/sweep-{}", mission.name)));
+    let settings: Vec<Setting> =
+        sets.iter().map(|text| Setting::parse(text)).collect::<Result<_, _>>().map_err(refused)?;
+    let measure = index_of(measure).map_err(|reason| End(2, format!("--measure: {reason}")))?;
+    let plan = SweepPlan::new(&path.display().to_string(), mission, settings, repeat).map_err(refused)?;
+    let stop = StopFlag::on_signals();
+    stop.arm();
+    let mut progress = Count::new("sweeping", plan.cells.len() * plan.repeats as usize);
+    let swept = crate::sweep::sweep(&plan, &out, |over, _| {
+        progress.reach(over, "");
+        !stop.is_raised()
+    });
+    progress.done();
+    let swept = swept.map_err(|reason| End(4, reason))?;
+    if !swept.complete {
+        return Err(interrupted(&out));
+    }
+    let command: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+    let command = format!("mission-control {}", command.join(" "));
+    crate::sweep::show(&plan, &swept, measure, &command, &out).map_err(|reason| End(4, reason))?;
+    bus::tell!(
+        "{} runs, {} of them new: {}",
+        swept.runs.len(),
+        swept.runs.len() - swept.found,
+        out.join("README.md").display()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn study(path: &Path, out: Option<PathBuf>) -> Ended {
+    let study = Study::read(path).map_err(|reason| End(2, reason))?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let out = out.unwrap_or_else(|| PathBuf::from(format!("runs/study-{stem}")));
+    let stop = StopFlag::on_signals();
+    stop.arm();
+    let mut progress = Count::new("sweeping", study.runs());
+    let command = format!("mission-control study {}", quoted(path.display().to_string()));
+    let complete = study.make(&out, &command, |over, _| {
+        progress.reach(over, "");
+        !stop.is_raised()
+    });
+    progress.done();
+    if !complete.map_err(|reason| End(4, reason))? {
+        return Err(interrupted(&out));
+    }
+    bus::tell!("{} runs: {}", study.runs(), out.join("README.md").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn interrupted(out: &Path) -> End {
+    End(1, format!("interrupted; {} keeps the runs that are over, and the same command goes on", out.display()))
+}
+
+/// A word of a command as a shell takes it.
+fn quoted(word: String) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
+    if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
 fn run_fleet(args: RunArgs) -> Ended {
@@ -427,6 +534,28 @@ fn stop(endpoint: &Endpoint) -> Ended {
     ask(endpoint, &ToFleet::Stop)?;
     bus::tell!("stopped");
     Ok(ExitCode::SUCCESS)
+}
+
+fn gallery(missions: &Path, out: &Path) -> Ended {
+    let gallery = Gallery::read(missions).map_err(|reason| End(2, reason))?;
+    let mut progress = Count::new("flying", gallery.missions());
+    let outcome = gallery.make(out, |name| progress.one_more(name));
+    progress.done();
+    let outcome = outcome.map_err(|reason| End(4, reason))?;
+    for name in &outcome.unused {
+        bus::remark!("warning: {name} is in no figure of {GALLERY}");
+    }
+    for fault in &outcome.faults {
+        bus::remark!("{fault}");
+    }
+    let agree = if outcome.faults.is_empty() { "all agree" } else { "not all agree" };
+    bus::tell!(
+        "{} figures, {} expected numbers, {agree}: {}",
+        outcome.figures,
+        outcome.expected,
+        out.join("index.html").display()
+    );
+    Ok(if outcome.faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn report(run: &Path) -> Ended {

@@ -14,7 +14,7 @@ use bus::queue::{Bell, Events};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use clap::Parser;
-use common::record::Name;
+use common::record::{ClockRecord, Name, NoteRow, Row};
 use common::wire::fleet::{Pace, ToFleet};
 use common::wire::vehicle::{ClockPlan, FromVehicle, Phase};
 use common::wire::{self, Garbage, GarbageCount};
@@ -27,13 +27,16 @@ const START_LEAD: Duration = Duration::from_millis(500);
 /// How long a port that is in use is waited for.
 const PORT_PATIENCE: Duration = Duration::from_secs(2);
 
-/// So many sendings within [`BURST`] go at once, each by itself. What more there is waits for [`GATHERING`], and travels in
+/// So many messages within [`BURST`] are sent at once, each by itself. What more there is waits for [`GATHERING`], and travels in
 /// bundles.
 const SINGLE_SENDINGS: usize = 16;
 /// See [`SINGLE_SENDINGS`].
 const BURST: Duration = Duration::from_millis(1);
 /// How long messages of a burst wait for others that go the same way.
 const GATHERING: Duration = Duration::from_micros(200);
+
+/// Between two notes about states that were dropped.
+const OVERRUN_PERIOD: Duration = Duration::from_secs(1);
 
 /// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
 ///
@@ -78,6 +81,7 @@ pub fn run(args: Args) -> ExitCode {
         ids: BTreeMap::new(),
         seats: Vec::new(),
         burst: Burst::default(),
+        overrun: Overrun::default(),
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
@@ -115,6 +119,13 @@ fn take_shortcut(program: &Arc<Shared<HubPort>>, bell: Bell<HubEvent>) {
     program.hold().port.switchboard.set_shortcut(Box::new(take));
 }
 
+/// States that came faster than they could be decided about.
+#[derive(Clone, Copy, Debug, Default)]
+struct Overrun {
+    noted: u64,
+    at: Option<Instant>,
+}
+
 /// How much was sent of late.
 #[derive(Clone, Copy, Debug, Default)]
 struct Burst {
@@ -143,6 +154,8 @@ struct HubPort {
     /// The lines of vehicles, by number.
     seats: Vec<Option<LineId>>,
     burst: Burst,
+    /// States that were dropped so far, and how many of them were noted, and when.
+    overrun: Overrun,
     /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
@@ -186,6 +199,22 @@ impl HubPort {
         }
         burst.send_at = Some(at + GATHERING);
         true
+    }
+
+    /// Notes, once a second, how many states were dropped before they could be decided about.
+    fn note_overrun(&mut self, hub: &Hub) {
+        let dropped = self.switchboard.dropped();
+        let fresh = self.overrun.at.is_none_or(|at| at.elapsed() >= OVERRUN_PERIOD);
+        if dropped > self.overrun.noted && fresh && hub.phase() == Phase::Running {
+            let note = NoteRow {
+                t_ns: hub.mission_time().nanos().max(0),
+                source: HUB.into(),
+                text: "states came faster than they could be taken: the oldest were dropped".into(),
+                count: dropped - self.overrun.noted,
+            };
+            self.logs.write(Row::Clock(ClockRecord::Note(note)));
+            self.overrun = Overrun { noted: dropped, at: Some(Instant::now()) };
+        }
     }
 
     fn ignore(&mut self, line: LineId, kind: Garbage) {
@@ -296,8 +325,9 @@ impl Port for HubPort {
         match self.burst.send_at {
             Some(at) if at > now => {}
             Some(_) => {
-                self.burst.send_at = None;
-                self.burst.sendings += self.switchboard.flush();
+                // It goes on while there is much to send.
+                let goes_on = self.switchboard.flush() >= SINGLE_SENDINGS / 2;
+                self.burst = Burst { begun: Some(now), sendings: 0, send_at: goes_on.then_some(now + GATHERING) };
             }
             None => {
                 self.send_at_once(now);
@@ -307,6 +337,7 @@ impl Port for HubPort {
     }
 
     fn tend(&mut self, hub: &Hub) -> Next<Self> {
+        self.note_overrun(hub);
         if let Some(failure) = self.logs.tend() {
             tracing::error!("{failure}; the network goes on without it");
             self.recording_failed = Some(failure);

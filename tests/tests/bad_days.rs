@@ -127,6 +127,21 @@ fn a_vehicle_that_is_killed_rejoins_where_the_others_are() {
 }
 
 #[test]
+fn a_log_that_begins_in_mid_flight_is_told() {
+    let mut fleet = Fleet::under_way(3000.0);
+    fleet.vehicles[1].kill();
+    fleet.status_until("b is missed", |status| of_vehicle(status, "b")["connected"] == false);
+    // Its next life does not know where the one before kept its log.
+    let elsewhere = ["--id", "b", "--connect", &fleet.endpoint, "--logs", "elsewhere"];
+    fleet.vehicles[1] = fleet.ground.start("b", Command::new(program("vehicle-node")).args(elsewhere));
+    fleet.status_until("b is back", |status| is_flying(status, "b"));
+    fleet.flies_on(5.0);
+    fleet.stop();
+    let facts = fs::read_to_string(fleet.ground.path("run/host.json")).expect("written");
+    assert!(facts.contains("the log of b begins at") && !facts.contains("the log of a begins at"), "{facts}");
+}
+
+#[test]
 fn a_fleet_flies_on_without_its_emulator_and_takes_it_back() {
     let mut fleet = Fleet::under_way(250.0);
     fleet.emulator.kill();
@@ -222,12 +237,15 @@ fn a_vehicle_that_was_frozen_comes_back_into_line() {
 
 /// A run that starts its own processes, in a group of its own as under a terminal, once every vehicle records.
 fn own_flight(ground: &Ground) -> Process {
-    let text = mission_text(MISSION);
-    ground.file("mission.toml", &text);
+    own_flight_of(ground, &mission_text(MISSION))
+}
+
+fn own_flight_of(ground: &Ground, text: &str) -> Process {
+    ground.file("mission.toml", text);
     let mut command = Command::new(program("mission-control"));
     let arguments = ["run", "mission.toml", "--speed-up", "10", "--listen", "tcp/127.0.0.1:0", "--out", "run"];
     let control = ground.start("mission-control", command.args(arguments).process_group(0));
-    let logs = ground.path(&format!("run/logs/{:016x}", digest(&text)));
+    let logs = ground.path(&format!("run/logs/{:016x}", digest(text)));
     for id in IDS {
         let log = logs.join(format!("{id}.mcap"));
         until(PATIENCE, "every vehicle records", || fs::metadata(&log).is_ok_and(|m| m.len() > 2000));
@@ -264,4 +282,25 @@ fn an_own_flight_ends_with_its_report_when_its_emulator_dies() {
     kill_process(Pid::from_raw(emulator).expect("a process"), Signal::KILL).expect("it is there");
     control.ends_with(1);
     assert_reported(&ground);
+}
+
+/// Nobody collects them, but they finish what they fly, and do not outlive it.
+#[test]
+fn own_processes_end_after_the_flight_when_mission_control_is_killed() {
+    let ground = Ground::new();
+    let text = with(&mission_text(MISSION), "duration_s = 3000.0", "duration_s = 40.0");
+    let mut control = own_flight_of(&ground, &text);
+    let id = control.id();
+    let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux");
+    let children: Vec<u32> = children.split_whitespace().map(|pid| pid.parse().expect("a number")).collect();
+    assert_eq!(children.len(), 4);
+    control.kill();
+    let lives = |pid: &u32| fs::read_to_string(format!("/proc/{pid}/cmdline")).is_ok_and(|words| !words.is_empty());
+    until(PATIENCE, "own processes end", || !children.iter().any(lives));
+    for id in IDS {
+        let log = ground.path(&format!("run/logs/{:016x}/{id}.mcap", digest(&text)));
+        let recording = bus::recording::read(log).expect("it is there");
+        let last = states(&recording.exact, id).last().expect("it recorded").t_ns;
+        assert!(recording.complete && last == 40_000_000_000, "{id} flew until {last} ns");
+    }
 }

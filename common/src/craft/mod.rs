@@ -4,11 +4,13 @@
 //! | craft | plant | path-following law | takes | file |
 //! |---|---|---|---|---|
 //! | kinematic | kinematic unicycle | line of sight (1.4) | rate | [`kinematic`] |
-//! | robot | dynamic unicycle (3.12) | Proposition 3.1 | acceleration (3.39), or rate (4.21) | [`robot`] |
+//! | robot | dynamic unicycle (3.12) | Proposition 3.1 or 3.2 | acceleration (3.39), or rate (4.21) | [`robot`] |
+//! | marine | fully actuated vehicle (3.28) | Proposition 3.3 | acceleration (3.39), or rate (4.21) | [`marine`] |
 //! | underactuated body in space | 6-DOF (4.44), (4.45) | Theorem 4.7 | rate | [`auv`] |
 
 pub mod auv;
 pub mod kinematic;
+pub mod marine;
 pub mod robot;
 
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
@@ -55,6 +57,13 @@ pub const SATURATED: &str = "an actuator was at its limit";
 pub const REFUSED: &str = "the law had no answer, the command before was held";
 /// A divisor of the law was too close to zero and was limited.
 pub const LIMITED: &str = "the law was close to singular, its divisors were limited";
+/// The vehicle was too slow to have a side-slip of its own.
+pub const SINGULAR: &str = "too slow to have a side-slip, the wanted one was taken for it";
+
+/// An effort within ±`limit`, and whether that took something of it.
+fn limited(effort: f64, limit: f64) -> (f64, bool) {
+    if effort.abs() > limit { (limit.copysign(effort), true) } else { (effort, false) }
+}
 
 /// Most actuators have one: the largest effort that they give, either way.
 #[derive(Clone, Copy, Debug, PartialEq)]

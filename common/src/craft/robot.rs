@@ -1,10 +1,11 @@
-//! The wheeled robot of chapter 3: a dynamic unicycle that follows a virtual target by Proposition 3.1.
+//! The wheeled robot of chapter 3: a dynamic unicycle that follows a virtual target by Proposition 3.1 or 3.2.
 
 use std::sync::Arc;
 
-use super::{Craft, Limits, Observation, SATURATED, Warning};
+use super::{Craft, Limits, Observation, SATURATED, Warning, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
-use crate::following::proposition_3_1::{Bend, Errors, Motion, Proposition31, Sense};
+use crate::following::proposition_3_1::{Bend, Errors, Gains, Motion, Proposition31, Sense, Steering};
+use crate::following::proposition_3_2::Proposition32;
 use crate::path::shape::is_planar;
 use crate::path::{Path, PathPoint};
 use crate::positive::{finite, positive};
@@ -25,9 +26,17 @@ pub enum SpeedLoop {
 }
 
 impl SpeedLoop {
+    /// The kind of demand that it answers.
+    pub fn takes(self) -> DemandKind {
+        match self {
+            SpeedLoop::Acceleration => DemandKind::Acceleration,
+            SpeedLoop::Rate { .. } => DemandKind::Rate,
+        }
+    }
+
     /// The forward acceleration F/m that `demand` asks for, the speed that is wanted, and the rate that is recorded;
     /// nothing if the demand is of the other kind.
-    fn answer(
+    pub(super) fn answer(
         self,
         demand: Demand,
         reference: SpeedReference,
@@ -54,10 +63,54 @@ impl SpeedLoop {
 }
 
 /// See [`SpeedLoop::answer`].
-struct Answer {
-    v_dot: f64,
-    wanted: f64,
-    v_ref: f64,
+pub(super) struct Answer {
+    pub(super) v_dot: f64,
+    pub(super) wanted: f64,
+    pub(super) v_ref: f64,
+}
+
+/// The path-following laws of wheeled robots.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RobotLaw {
+    /// Proposition 3.1.
+    Proposition31(Proposition31),
+    /// Proposition 3.2.
+    Proposition32(Proposition32),
+}
+
+impl From<Proposition31> for RobotLaw {
+    fn from(law: Proposition31) -> RobotLaw {
+        RobotLaw::Proposition31(law)
+    }
+}
+
+impl From<Proposition32> for RobotLaw {
+    fn from(law: Proposition32) -> RobotLaw {
+        RobotLaw::Proposition32(law)
+    }
+}
+
+impl RobotLaw {
+    fn gains(&self) -> &Gains {
+        match self {
+            RobotLaw::Proposition31(law) => law.gains(),
+            RobotLaw::Proposition32(law) => law.gains(),
+        }
+    }
+
+    fn target_speed(&self, e: &Errors, v: f64) -> f64 {
+        match self {
+            RobotLaw::Proposition31(law) => law.target_speed(e, v),
+            RobotLaw::Proposition32(law) => law.target_speed(e, v),
+        }
+    }
+
+    fn steer(&self, e: &Errors, motion: &Motion, bend: &Bend, sense: Sense) -> Steering {
+        match self {
+            RobotLaw::Proposition31(law) => law.steer(e, motion, bend, sense),
+            RobotLaw::Proposition32(law) => law.steer(e, motion, bend, sense),
+        }
+    }
 }
 
 /// What is held between two evaluations of the law.
@@ -68,11 +121,11 @@ struct Held {
     v_ref: f64,
 }
 
-/// A wheeled robot under Proposition 3.1.
+/// A wheeled robot under Proposition 3.1 or 3.2.
 #[derive(Debug)]
 pub struct RobotCraft {
     path: Arc<dyn Path>,
-    law: Proposition31,
+    law: RobotLaw,
     speed_loop: SpeedLoop,
     parameters: Parameters,
     state: State,
@@ -91,7 +144,7 @@ impl RobotCraft {
     /// corners; a robot without mass is refused.
     pub fn new(
         path: Arc<dyn Path>,
-        law: Proposition31,
+        law: impl Into<RobotLaw>,
         speed_loop: SpeedLoop,
         parameters: Parameters,
         state: State,
@@ -110,7 +163,7 @@ impl RobotCraft {
         let (target, parameters) = (path.at(finite("the robot's xi", xi)?), parameters.checked()?);
         Ok(RobotCraft {
             path,
-            law,
+            law: law.into(),
             speed_loop,
             parameters,
             state,
@@ -154,10 +207,7 @@ impl RobotCraft {
 
 impl Craft for RobotCraft {
     fn takes(&self) -> DemandKind {
-        match self.speed_loop {
-            SpeedLoop::Acceleration => DemandKind::Acceleration,
-            SpeedLoop::Rate { .. } => DemandKind::Rate,
-        }
+        self.speed_loop.takes()
     }
 
     /// The engine keeps its stuck speed at once (section 2.4: v_i = v₀).
@@ -187,11 +237,11 @@ impl Craft for RobotCraft {
         // ξ̇ = ṡ/R = (v cos ψ_e + k₃ x_e)/R (3.35)
         let xi_rate = self.law.target_speed(&e, v) / self.target.r();
         let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v, xi_rate) else { return };
-        self.sense = self.law.sense(self.sense, v, answer.wanted);
+        self.sense = self.law.gains().sense(self.sense, v, answer.wanted);
         let Parameters { mass, inertia } = self.parameters;
         let (force, cut) = limited(mass * answer.v_dot, self.limits.force);
         let v_dot = if cut { force / mass } else { answer.v_dot };
-        let motion = Motion { v, v_dot, r: state.turn_rate };
+        let motion = Motion { v, v_dot, r: state.turn_rate, ..Motion::default() };
         let steering = self.law.steer(&e, &motion, &Bend::of(&self.target), self.sense);
         let (torque, cut_too) = limited(inertia * steering.r_dot, self.limits.torque);
         self.saturated += u64::from(cut || cut_too);
@@ -241,11 +291,6 @@ impl Craft for RobotCraft {
     fn warnings(&self) -> Vec<Warning> {
         vec![Warning { what: SATURATED, count: self.saturated }]
     }
-}
-
-/// An effort within ±`limit`, and whether that took something of it.
-fn limited(effort: f64, limit: f64) -> (f64, bool) {
-    if effort.abs() > limit { (limit.copysign(effort), true) } else { (effort, false) }
 }
 
 #[cfg(test)]
@@ -505,7 +550,7 @@ mod tests {
             ..InstrumentErrors::default()
         };
         let (current, stuck_speed) = (Some(Vector3::new(0.0, -0.3, 0.0)), Some(0.25));
-        craft.expose(&Conditions { current, errors: Some(errors), stuck_speed });
+        craft.expose(&Conditions { current, errors: Some(errors), stuck_speed, ..Conditions::default() });
         // The laws see v = 0.3 and a vehicle at the left; the record does not.
         assert!((craft.own(REFERENCE).eta - 0.2).abs() < 1e-15);
         assert_eq!((craft.observe().speed, craft.observe().e_cross), (0.25, 0.0));

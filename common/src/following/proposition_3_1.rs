@@ -3,6 +3,8 @@
 //! Errors in the frame {T} of the virtual target (3.10), their kinematics (3.11), the law (3.13)-(3.15). The
 //! derivative φ̇ in (3.14) is written out (Appendix 6.1, items 8 to 10, and erratum 3.8); it needs v̇ = F/m, which
 //! is known because the force is commanded.
+//!
+//! What Propositions 3.2 and 3.3 have in common with it is [`steering`]: they differ in Δ and in the side-slip.
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
@@ -171,6 +173,27 @@ impl Default for Gains {
     }
 }
 
+impl Gains {
+    /// The gains, or what is wrong with them.
+    pub fn checked(self) -> Result<Gains, String> {
+        positive("k_1", self.k_1)?;
+        positive("k_3", self.k_3)?;
+        positive("k_4", self.k_4)?;
+        not_negative("the threshold of the sense of travel", self.sense_threshold)?;
+        self.approach.checked()?;
+        Ok(self)
+    }
+
+    /// The sense of travel that follows `previous` at speed `v` when `v_desired` is wanted.
+    pub fn sense(&self, previous: Sense, v: f64, v_desired: f64) -> Sense {
+        let speed = match self.sense_of {
+            SenseOf::ActualSpeed => v,
+            SenseOf::DesiredSpeed => v_desired,
+        };
+        previous.after(speed, self.sense_threshold)
+    }
+}
+
 /// How the vehicle moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
@@ -180,6 +203,17 @@ pub struct Motion {
     pub v_dot: f64,
     /// r \[rad/s\].
     pub r: f64,
+    /// The side-slip's motion; none for a wheeled robot.
+    pub slip: Slip,
+}
+
+/// How the side-slip β moves, in (3.26) and erratum 3.3.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Slip {
+    /// β̇ \[rad/s\].
+    pub beta_dot: f64,
+    /// β̈ \[rad/s²\].
+    pub beta_ddot: f64,
 }
 
 /// The path at the virtual target, as far as the law needs it.
@@ -220,66 +254,87 @@ pub struct Proposition31 {
 impl Proposition31 {
     /// The law with these gains, or what is wrong with them.
     pub fn new(gains: Gains) -> Result<Proposition31, String> {
-        positive("k_1", gains.k_1)?;
-        positive("k_3", gains.k_3)?;
-        positive("k_4", gains.k_4)?;
-        not_negative("the threshold of the sense of travel", gains.sense_threshold)?;
-        gains.approach.checked()?;
-        Ok(Proposition31 { gains })
+        Ok(Proposition31 { gains: gains.checked()? })
     }
 
     /// The sense of travel that follows `previous` at speed `v` when `v_desired` is wanted.
     pub fn sense(&self, previous: Sense, v: f64, v_desired: f64) -> Sense {
-        let speed = match self.gains.sense_of {
-            SenseOf::ActualSpeed => v,
-            SenseOf::DesiredSpeed => v_desired,
-        };
-        previous.after(speed, self.gains.sense_threshold)
+        self.gains.sense(previous, v, v_desired)
     }
 
     /// ṡ = v cos ψ_e + k₃ x_e (3.15).
     pub fn target_speed(&self, e: &Errors, v: f64) -> f64 {
-        v * e.psi_e.cos() + self.gains.k_3 * e.x_e
+        target_speed(self.gains.k_3, e, v)
     }
 
     /// (3.13) to (3.15).
     pub fn steer(&self, e: &Errors, motion: &Motion, bend: &Bend, sense: Sense) -> Steering {
-        let Gains { k_1, k_3, k_4, .. } = self.gains;
-        let Errors { x_e, y_e, psi_e } = *e;
-        let Motion { v, v_dot, r } = *motion;
-        let Bend { c_c, dc_ds } = *bend;
-        let (sin, cos) = psi_e.sin_cos();
-
-        // (3.15)
-        let s_dot = self.target_speed(e, v);
-        // (3.11)
-        let x_e_dot = (y_e * c_c - 1.0) * s_dot + v * cos;
-        let y_e_dot = -x_e * c_c * s_dot + v * sin;
-        let psi_e_dot = r - c_c * s_dot;
-        // Appendix 6.1, items 8 and 9
-        let s_ddot = v_dot * cos - v * sin * psi_e_dot + k_3 * x_e_dot;
-        let y_e_ddot = -x_e_dot * c_c * s_dot - x_e * dc_ds * s_dot.powi(2) - x_e * c_c * s_ddot
-            + v_dot * sin
-            + v * cos * psi_e_dot;
-        // Items 6, 7 and 10
-        let sigma = self.gains.approach.sigma(y_e, sense);
-        let sigma_dot = sigma.d1 * y_e_dot;
-        let sigma_ddot = sigma.d2 * y_e_dot.powi(2) + sigma.d1 * y_e_ddot;
-        let sigma = sigma.value;
-        let slope = MeanCosine::between(psi_e, sigma);
-        let delta = slope.value;
-        let delta_dot = slope.rate(psi_e_dot, sigma_dot);
-
-        // (3.13)
-        let phi = c_c * s_dot + sigma_dot - k_1 * (psi_e - sigma) - v * y_e * delta;
-        // Its derivative, erratum 3.8
-        let phi_dot = dc_ds * s_dot.powi(2) + c_c * s_ddot + sigma_ddot
-            - k_1 * (psi_e_dot - sigma_dot)
-            - (v_dot * y_e * delta + v * y_e_dot * delta + v * y_e * delta_dot);
-        // (3.14)
-        let r_dot = phi_dot - k_4 * (r - phi) - (psi_e - sigma);
-        Steering { r_dot, s_dot, sigma, phi }
+        steering(&self.gains, Coupling::MeanCosine, e, motion, bend, sense)
     }
+
+    /// Its gains.
+    pub fn gains(&self) -> &Gains {
+        &self.gains
+    }
+}
+
+/// Δ of φ, by which the heading counters y_e in V_p.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coupling {
+    /// (3.13), with erratum 3.2.
+    MeanCosine,
+    /// Δ ≡ 0, Proposition 3.2.
+    None,
+}
+
+/// ṡ = v cos ψ_e + k₃ x_e (3.15), (3.17), (3.32).
+pub fn target_speed(k_3: f64, e: &Errors, v: f64) -> f64 {
+    v * e.psi_e.cos() + k_3 * e.x_e
+}
+
+/// What the three propositions of section 3.2 have in common: (3.13) with its derivative, and the turning
+/// acceleration φ̇ − k₄(r − φ) − (ψ_e − σ). With a side-slip, v is the total speed, ψ_e that of the flow frame, and φ
+/// contains −β̇ (erratum 3.3).
+#[inline]
+pub fn steering(gains: &Gains, coupling: Coupling, e: &Errors, motion: &Motion, bend: &Bend, sense: Sense) -> Steering {
+    let Gains { k_1, k_3, k_4, .. } = *gains;
+    let Errors { x_e, y_e, psi_e } = *e;
+    let Motion { v, v_dot, r, slip: Slip { beta_dot, beta_ddot } } = *motion;
+    let Bend { c_c, dc_ds } = *bend;
+    let (sin, cos) = psi_e.sin_cos();
+
+    // (3.15)
+    let s_dot = target_speed(k_3, e, v);
+    // (3.11), (3.26)
+    let x_e_dot = (y_e * c_c - 1.0) * s_dot + v * cos;
+    let y_e_dot = -x_e * c_c * s_dot + v * sin;
+    let psi_e_dot = r - c_c * s_dot + beta_dot;
+    // Appendix 6.1, items 8 and 9
+    let s_ddot = v_dot * cos - v * sin * psi_e_dot + k_3 * x_e_dot;
+    let y_e_ddot =
+        -x_e_dot * c_c * s_dot - x_e * dc_ds * s_dot.powi(2) - x_e * c_c * s_ddot + v_dot * sin + v * cos * psi_e_dot;
+    // Items 6, 7 and 10
+    let sigma = gains.approach.sigma(y_e, sense);
+    let sigma_dot = sigma.d1 * y_e_dot;
+    let sigma_ddot = sigma.d2 * y_e_dot.powi(2) + sigma.d1 * y_e_ddot;
+    let sigma = sigma.value;
+    let (delta, delta_dot) = match coupling {
+        Coupling::MeanCosine => {
+            let slope = MeanCosine::between(psi_e, sigma);
+            (slope.value, slope.rate(psi_e_dot, sigma_dot))
+        }
+        Coupling::None => (0.0, 0.0),
+    };
+
+    // (3.13), erratum 3.3
+    let phi = c_c * s_dot - beta_dot + sigma_dot - k_1 * (psi_e - sigma) - v * y_e * delta;
+    // Its derivative, erratum 3.8
+    let phi_dot = dc_ds * s_dot.powi(2) + c_c * s_ddot - beta_ddot + sigma_ddot
+        - k_1 * (psi_e_dot - sigma_dot)
+        - (v_dot * y_e * delta + v * y_e_dot * delta + v * y_e * delta_dot);
+    // (3.14)
+    let r_dot = phi_dot - k_4 * (r - phi) - (psi_e - sigma);
+    Steering { r_dot, s_dot, sigma, phi }
 }
 
 /// Δ = (sin a − sin b)/(a − b) of (3.13), the mean of the cosine between b and a, written so that it is smooth at
@@ -352,7 +407,7 @@ mod tests {
         }
 
         fn steering(&self, state: &State) -> Steering {
-            let motion = Motion { v: state[3], v_dot: self.force, r: state[4] };
+            let motion = Motion { v: state[3], v_dot: self.force, r: state[4], ..Motion::default() };
             let sense = Sense::Forward.after(state[3], 0.0);
             self.law.steer(&self.errors(state), &motion, &Bend::of(&self.path.at(state[5])), sense)
         }
@@ -447,7 +502,7 @@ mod tests {
     fn on_the_path_it_turns_with_the_path() {
         let circle = Circle::new(Vector3::zeros(), 4.0, Turn::Right, 0.0, 1.0).unwrap();
         let bend = Bend::of(&circle.at(0.3));
-        let motion = Motion { v: 2.0, v_dot: 0.0, r: -0.5 };
+        let motion = Motion { v: 2.0, r: -0.5, ..Motion::default() };
         let steering = law(ARCSINE).steer(&Errors::default(), &motion, &bend, Sense::Forward);
         assert!((steering.phi + 0.5).abs() < 1e-15 && steering.r_dot.abs() < 1e-14 && steering.s_dot == 2.0);
         // φ̇ = c_c v̇: accelerating in a bend takes a turning acceleration.

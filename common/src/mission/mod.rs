@@ -6,6 +6,7 @@ mod fault;
 pub mod file;
 mod link;
 mod pattern;
+mod read;
 mod shape;
 mod speed;
 
@@ -13,9 +14,10 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-pub use fault::{Fault, Faults};
+pub use fault::{Collector, Fault, Faults};
 pub use link::{Layer, Link};
 pub use pattern::{Pattern, PatternMotion, PatternPoint};
+pub use read::read;
 pub use shape::schema;
 pub use speed::SpeedProfile;
 

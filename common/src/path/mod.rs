@@ -9,19 +9,26 @@
 //! | circle | Figure 1.5, Figure 3.10 | p = c + R (cos(θ₀ ± ρ ξ), sin(θ₀ ± ρ ξ), 0) | [`circle`] |
 //! | sinusoid | Figure 3.9 | y = y₀ + a sin(2π x/λ + φ), x = ξ | [`sinusoid`] |
 //! | helix | section 4.6 | p = (c₁ cos(2π ξ/T + φ), c₁ sin(2π ξ/T + φ), c₂ ξ + z₀) | [`helix`] |
+//! | smooth curve through waypoints | – | natural cubic spline, C², ξ near the arc length or given at the waypoints | [`spline`] |
 //! | lines and arcs joined | Figures 3.7 and 3.8, Remark 3.8 | R_i constant on each segment | [`chain`] |
 //!
+//! Waypoints on the globe come from [`geojson`] by [`geodesy`].
+//!
 //! What follows from p', p'' and p''' (R, heading, curvature) is in [`geometry`], the point closest to a vehicle in
-//! [`closest`], and what a law may ask of a path as a whole in [`shape`].
+//! [`closest`], the same followed under way in [`foot`], and what a law may ask of a path as a whole in [`shape`].
 
 pub mod chain;
 pub mod circle;
 pub mod closest;
+pub mod foot;
+pub mod geodesy;
+pub mod geojson;
 pub mod geometry;
 pub mod helix;
 pub mod line;
 pub mod shape;
 pub mod sinusoid;
+pub mod spline;
 
 use nalgebra::Vector3;
 

@@ -21,6 +21,8 @@ use crate::time::Time;
 /// What a vehicle is exposed to during one control period. The default is nothing at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Conditions {
+    /// When the period begins.
+    pub now: Time,
     /// Velocity of the water in the inertial frame \[m/s\].
     pub current: Option<Vector3<f64>>,
     /// The errors of the instruments at the period's instant.
@@ -180,6 +182,7 @@ impl Environment {
     pub fn conditions(&mut self, now: Time, index: u64) -> Conditions {
         let Disturbances { current, noise, stuck } = self.disturbances;
         Conditions {
+            now,
             current: current.map(|current| current.at(now)),
             errors: noise.map(|levels| levels.sample(&mut self.stream, index)),
             stuck_speed: stuck.filter(|stuck| stuck.from <= now && now < stuck.to).map(|stuck| stuck.speed),

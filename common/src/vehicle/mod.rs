@@ -4,6 +4,7 @@
 //! |---|---|---|---|
 //! | kinematic unicycle | section 1.2 | ẋ = v cos ψ, ẏ = v sin ψ; v and ψ are the inputs | [`kinematic_unicycle`] |
 //! | dynamic unicycle | section 3.2.1, (3.12) | v̇ = F/m, ṙ = N/I | [`dynamic_unicycle`] |
+//! | fully actuated marine vehicle | section 3.2.2 | (3.28)–(3.30) | [`marine`] |
 //! | underactuated body in space | sections 4.5, 4.6 | (4.44), (4.45) | [`auv`] |
 //! | its Sirene-like parameters, derived | section 4.6 | – | [`sirene`] |
 //!
@@ -17,4 +18,5 @@ pub mod dynamic_unicycle;
 pub mod environment;
 pub mod integrate;
 pub mod kinematic_unicycle;
+pub mod marine;
 pub mod sirene;

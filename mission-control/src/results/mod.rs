@@ -10,17 +10,18 @@
 //! | [`diff()`] | *equal*, or the first row in which two runs part |
 
 mod diff;
+pub(crate) mod drawing;
 mod export;
 mod facts;
 mod figures;
 mod folder;
-mod network;
-mod report;
+pub(crate) mod network;
+pub(crate) mod report;
 mod series;
-mod statistics;
+pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod trace;
 
 pub use diff::{Outcome, Side, diff, origins_differ};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::figures::{GRID, INK, PAPER};
+use super::drawing::{GRID, INK, PAPER};
 use super::summary::PATH_THRESHOLD_M;
 use super::{ClockSummary, Facts, Figure, LinkSummary, Summary, VehicleSummary};
 
@@ -353,7 +353,7 @@ fn reproduce(page: &mut String, report: &Report<'_>) {
 }
 
 /// A table that scrolls sideways on a narrow screen. Cells are HTML already.
-fn table(page: &mut String, class: &str, header: &[&str], rows: impl Iterator<Item = Vec<String>>) {
+pub(crate) fn table(page: &mut String, class: &str, header: &[&str], rows: impl Iterator<Item = Vec<String>>) {
     let _ = write!(page, "<div class=\"scroll\"><table class=\"{class}\">\n<thead><tr>");
     for cell in header {
         let _ = write!(page, "<th>{}</th>", escape(cell));
@@ -385,7 +385,7 @@ fn inline(svg: &str) -> String {
 }
 
 /// Text that means itself in HTML.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -409,7 +409,7 @@ fn percent(part: f64) -> String {
 }
 
 /// A number with three or four significant digits, as HTML.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let magnitude = value.abs();
     let minus = if value < 0.0 { "−" } else { "" };
     if magnitude == 0.0 {
@@ -426,7 +426,7 @@ fn number(value: f64) -> String {
     format!("{minus}{text}")
 }
 
-const STYLE: &str = include_str!("report.css");
+pub(crate) const STYLE: &str = include_str!("report.css");
 
 #[cfg(test)]
 mod tests {

@@ -8,8 +8,6 @@ mod vehicle;
 
 use std::collections::HashMap;
 
-use toml::de::DeTable;
-
 use self::coordination::{check_law, check_told, check_weights};
 use self::network::{check_links, check_medium, check_switching, with_preset};
 use self::time::{check_formation, check_times};
@@ -17,12 +15,12 @@ use self::vehicle::check_vehicle;
 use super::build;
 use super::fault::{Collector, Faults};
 use super::file::{MissionFile, VehicleSection};
-use super::shape::check_shape;
+use super::read::shaped;
 use super::{Mission, SpeedProfile, VehiclePlan, digest};
 use crate::time::Span;
 
 /// Most vehicles in a mission.
-pub(super) const MOST_VEHICLES: usize = 64;
+pub(super) const MOST_VEHICLES: usize = 256;
 
 /// Longest mission \[s\]: thirty days.
 pub(super) const LONGEST: f64 = 30.0 * 86_400.0;
@@ -32,25 +30,7 @@ pub(super) const FASTEST: f64 = 1e6;
 
 pub(super) fn check(name: &str, text: &str) -> Result<Mission, Faults> {
     let mut faults = Collector::new(text);
-    match DeTable::parse(text) {
-        Err(error) => {
-            let byte = error.span().map(|span| span.start);
-            faults.fault_at(byte, String::new(), error.message().to_string());
-            return Err(faults.into_faults(name));
-        }
-        Ok(table) => check_shape(&mut faults, table.get_ref()),
-    }
-    let file: MissionFile = match toml::from_str(text) {
-        Ok(file) => file,
-        Err(error) => {
-            // The shape check explains it better, unless it let something pass.
-            if faults.is_empty() {
-                let byte = error.span().map(|span| span.start);
-                faults.fault_at(byte, String::new(), error.message().to_string());
-            }
-            return Err(faults.into_faults(name));
-        }
-    };
+    let Some(file) = shaped::<MissionFile>(&mut faults, text) else { return Err(faults.into_faults(name)) };
     match assemble(&mut faults, &file, text) {
         Some(mission) if faults.is_empty() => Ok(mission),
         _ => Err(faults.into_faults(name)),

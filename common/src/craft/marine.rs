@@ -1,0 +1,393 @@
+//! A fully actuated marine vehicle in the plane that follows a virtual target with a commanded side-slip: Proposition 3.3.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use super::robot::SpeedLoop;
+use super::{Craft, Limits, Observation, SATURATED, SINGULAR, Warning, limited};
+use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
+use crate::following::proposition_3_1::{Bend, Errors, Motion, Sense};
+use crate::following::proposition_3_3::{Proposition33, WantedSlip};
+use crate::path::shape::is_planar;
+use crate::path::{Path, PathPoint};
+use crate::positive::{finite, positive};
+use crate::time::Time;
+use crate::vehicle::environment::Conditions;
+use crate::vehicle::integrate::advance;
+use crate::vehicle::marine::{Flow, Input, Parameters, State, model};
+
+/// The total speed below which a vehicle has no side-slip of its own \[m/s\] (erratum 3.5).
+pub const SLOWEST: f64 = 0.01;
+
+/// β_d(t) = mean + amplitude sin(2π t/T).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SideSlip {
+    /// Mean \[rad\].
+    pub mean: f64,
+    /// Amplitude \[rad\].
+    pub amplitude: f64,
+    /// T \[s\], positive.
+    pub period: f64,
+}
+
+impl SideSlip {
+    /// None at all: the bow along the path.
+    pub const NONE: SideSlip = SideSlip { mean: 0.0, amplitude: 0.0, period: 1.0 };
+
+    /// The side-slip if it is one, otherwise what is wrong with it.
+    pub fn checked(self) -> Result<SideSlip, String> {
+        finite("the side-slip", self.mean)?;
+        finite("the amplitude of the side-slip", self.amplitude)?;
+        positive("the period of the side-slip", self.period)?;
+        Ok(self)
+    }
+
+    fn at(&self, now: Time) -> WantedSlip {
+        let w = TAU / self.period;
+        let (sin, cos) = (w * now.secs()).sin_cos();
+        let a = self.amplitude;
+        WantedSlip { beta: self.mean + a * sin, beta_dot: a * w * cos, beta_ddot: -a * w * w * sin }
+    }
+}
+
+/// What is held between two evaluations of the law.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    input: Input,
+    xi_rate: f64,
+    v_ref: f64,
+}
+
+/// A fully actuated marine vehicle under Proposition 3.3.
+#[derive(Debug)]
+pub struct MarineCraft {
+    path: Arc<dyn Path>,
+    law: Proposition33,
+    speed_loop: SpeedLoop,
+    side_slip: SideSlip,
+    parameters: Parameters,
+    state: State,
+    xi: f64,
+    target: PathPoint,
+    sense: Sense,
+    held: Held,
+    limits: Limits,
+    conditions: Conditions,
+    saturated: u64,
+    singular: u64,
+}
+
+impl MarineCraft {
+    /// The vehicle in `state` with its virtual target at `xi`. The path must lie in a horizontal plane and have no
+    /// corners.
+    pub fn new(
+        path: Arc<dyn Path>,
+        law: Proposition33,
+        speed_loop: SpeedLoop,
+        side_slip: SideSlip,
+        parameters: Parameters,
+        state: State,
+        xi: f64,
+    ) -> Result<MarineCraft, String> {
+        if !is_planar(&*path) {
+            return Err("a marine vehicle follows paths in a horizontal plane only".to_owned());
+        }
+        if let [corner, ..] = path.tangent_breaks() {
+            return Err(format!("a marine vehicle cannot follow the corner of its path at xi = {corner}"));
+        }
+        if let SpeedLoop::Rate { k_0 } = speed_loop {
+            positive("the gain k_0", k_0)?;
+        }
+        state.to_vector().iter().try_for_each(|&x| finite("the vehicle's state", x).map(drop))?;
+        let target = path.at(finite("the vehicle's xi", xi)?);
+        Ok(MarineCraft {
+            path,
+            law,
+            speed_loop,
+            side_slip: side_slip.checked()?,
+            parameters: parameters.checked()?,
+            state,
+            xi,
+            target,
+            sense: Sense::default(),
+            held: Held::default(),
+            limits: Limits::NONE,
+            conditions: Conditions::default(),
+            saturated: 0,
+            singular: 0,
+        })
+    }
+
+    /// The vehicle with forces and a torque that it cannot exceed.
+    pub fn limited(mut self, limits: Limits) -> MarineCraft {
+        self.limits = limits;
+        self
+    }
+
+    /// Its state as its instruments tell it.
+    fn measured(&self) -> State {
+        let Some(errors) = self.conditions.errors else { return self.state };
+        State {
+            x: self.state.x + errors.position.x,
+            y: self.state.y + errors.position.y,
+            heading: self.state.heading + errors.heading,
+            surge: self.state.surge + errors.velocity.x,
+            sway: self.state.sway + errors.velocity.y,
+            turn_rate: self.state.turn_rate + errors.spin.z,
+        }
+    }
+
+    fn wanted(&self) -> WantedSlip {
+        self.side_slip.at(self.conditions.now)
+    }
+
+    fn flow(&self, state: &State) -> Flow {
+        Flow::of(state.surge, state.sway, self.wanted().beta, SLOWEST)
+    }
+
+    /// The errors of the flow frame: ψ_e = ψ_B + β − ψ_T (3.27).
+    fn errors(&self, state: &State, flow: &Flow) -> Errors {
+        Errors::of(&self.target, state.x, state.y, state.heading + flow.beta)
+    }
+
+    fn move_target(&mut self, xi: f64) {
+        self.xi = xi;
+        self.target = self.path.at(xi);
+    }
+
+    fn hold_stuck_speed(&mut self) {
+        if let Some(speed) = self.conditions.stuck_speed {
+            self.state.surge = speed;
+        }
+    }
+}
+
+impl Craft for MarineCraft {
+    fn takes(&self) -> DemandKind {
+        self.speed_loop.takes()
+    }
+
+    fn expose(&mut self, conditions: &Conditions) {
+        self.conditions = *conditions;
+        self.hold_stuck_speed();
+    }
+
+    /// With η = v_t − R v_L (3.38), or zero for a vehicle that takes a rate.
+    fn own(&self, reference: SpeedReference) -> Own {
+        let (r, state) = (self.target.r(), self.measured());
+        let flow = self.flow(&state);
+        let eta = match self.speed_loop {
+            SpeedLoop::Acceleration => flow.v_t - r * reference.v_l,
+            SpeedLoop::Rate { .. } => 0.0,
+        };
+        let xi_rate = self.law.target_speed(&self.errors(&state, &flow), flow.v_t) / r;
+        let r_dot = self.target.dr_dxi() * xi_rate;
+        Own { xi: self.xi, eta, r, v: flow.v_t, r_dot, ..Own::default() }
+    }
+
+    fn command(&mut self, reference: SpeedReference, demand: Demand) {
+        let (state, p) = (self.measured(), self.parameters);
+        let flow = self.flow(&state);
+        let Flow { v_t, beta, is_singular } = flow;
+        let e = self.errors(&state, &flow);
+        // ξ̇ = ṡ/R with (3.32)
+        let xi_rate = self.law.target_speed(&e, v_t) / self.target.r();
+        let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v_t, xi_rate) else { return };
+        self.sense = self.law.sense(self.sense, v_t, answer.wanted);
+        self.singular += u64::from(is_singular);
+
+        // τ_vt = v̇_t − f_vt, τ_β = β̇ − f_β
+        let (slip, r) = (self.law.slip(beta, &self.wanted()), state.turn_rate);
+        let tau_beta = slip.beta_dot - p.f_beta(beta, r);
+        let [surge, sway] = p.forces(v_t, beta, answer.v_dot - p.f_vt(v_t, beta, r), tau_beta);
+        let ((surge, cut), (sway, cut_too)) = (limited(surge, self.limits.force), limited(sway, self.limits.force));
+        let v_dot = if cut || cut_too {
+            p.f_vt(v_t, beta, r) + beta.cos() / p.m_u * surge + beta.sin() / p.m_v * sway
+        } else {
+            answer.v_dot
+        };
+        let steering = self.law.steer(&e, &Motion { v: v_t, v_dot, r, slip }, &Bend::of(&self.target), self.sense);
+        // (3.31)
+        let (torque, cut_torque) = limited(p.m_r * (steering.r_dot - p.f_r(v_t, beta, r)), self.limits.torque);
+        self.saturated += u64::from(cut || cut_too || cut_torque);
+        self.held = Held { input: Input { surge, sway, torque }, xi_rate, v_ref: answer.v_ref };
+    }
+
+    fn advance(&mut self, dt: f64, substeps: usize) {
+        let steps = substeps.max(1);
+        for _ in 0..steps {
+            let (state, h) = (self.state.to_vector(), dt / steps as f64);
+            self.state = State::from_vector(advance(model, &state, &self.held.input, &self.parameters, h, 1));
+            self.hold_stuck_speed();
+        }
+        if let Some(drift) = self.conditions.drift(dt) {
+            self.state.x += drift.x;
+            self.state.y += drift.y;
+        }
+        self.move_target(self.xi + self.held.xi_rate * dt);
+    }
+
+    /// The speed is v_t, and ψ_e that of the flow frame.
+    fn observe(&self) -> Observation {
+        let flow = self.flow(&self.state);
+        let e = self.errors(&self.state, &flow);
+        Observation {
+            xi: self.xi,
+            xi_rate: self.held.xi_rate,
+            v_ref: self.held.v_ref,
+            position: [self.state.x, self.state.y, self.target.p.z],
+            attitude: [self.state.heading, 0.0, 0.0],
+            speed: flow.v_t,
+            e_along: e.x_e,
+            e_cross: e.y_e,
+            e_norm: e.x_e.hypot(e.y_e),
+            psi_e: e.psi_e,
+        }
+    }
+
+    fn place_target(&mut self, xi: f64) {
+        self.move_target(xi);
+    }
+
+    fn is_sound(&self) -> bool {
+        let Held { input: Input { surge, sway, torque }, xi_rate, v_ref } = self.held;
+        [self.xi, surge, sway, torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
+            && self.state.to_vector().iter().all(|x| x.is_finite())
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        vec![Warning { what: SATURATED, count: self.saturated }, Warning { what: SINGULAR, count: self.singular }]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::following::proposition_3_1::Gains;
+    use crate::path::circle::{Circle, Turn};
+    use crate::path::helix::Helix;
+    use crate::path::line::Line;
+    use crate::vehicle::environment::InstrumentErrors;
+
+    const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
+    const PARAMETERS: Parameters =
+        Parameters { m_u: 500.0, m_v: 1000.0, m_r: 700.0, d_u: 100.0, d_v: 300.0, d_r: 400.0 };
+    const WEAVING: SideSlip = SideSlip { mean: 0.2, amplitude: 0.3, period: 31.4 };
+
+    fn craft(path: impl Path + 'static, side_slip: SideSlip, state: State) -> MarineCraft {
+        let law = Proposition33::new(Gains::default(), 1.0).unwrap();
+        MarineCraft::new(Arc::new(path), law, SpeedLoop::Rate { k_0: 1.0 }, side_slip, PARAMETERS, state, 0.0).unwrap()
+    }
+
+    fn circle(turn: Turn) -> Circle {
+        Circle::new(Vector3::zeros(), 5.0, turn, 0.0, 1.0).unwrap()
+    }
+
+    /// Exposed to still water, at periods of 20 ms from time zero.
+    fn fly(craft: &mut MarineCraft, periods: std::ops::Range<usize>) {
+        for period in periods {
+            let now = Time::from_secs(0.02 * period as f64);
+            craft.expose(&Conditions { now, ..craft.conditions });
+            craft.command(REFERENCE, Demand::Rate(0.1));
+            craft.advance(0.02, 2);
+            assert!(craft.is_sound());
+        }
+    }
+
+    #[test]
+    fn it_follows_a_circle_with_the_side_slip_that_is_wanted() {
+        let start = State { x: 5.5, y: -0.5, heading: 1.0, surge: 0.3, ..State::default() };
+        let mut craft = craft(circle(Turn::Left), WEAVING, start);
+        fly(&mut craft, 0..6000);
+        let (seen, flow) = (craft.observe(), craft.flow(&craft.state));
+        assert!(seen.e_norm < 2e-3 && seen.psi_e.abs() < 5e-3, "{seen:?}");
+        assert!((seen.speed - 0.5).abs() < 1e-3 && (flow.beta - craft.wanted().beta).abs() < 2e-3, "{flow:?}");
+        assert!(craft.warnings().iter().all(|warning| warning.count == 0));
+    }
+
+    #[test]
+    fn from_rest_the_side_slip_is_the_wanted_one_and_that_is_counted() {
+        let mut craft = craft(Line::new(Vector3::zeros(), 0.3, 1.0).unwrap(), WEAVING, State::default());
+        fly(&mut craft, 0..4000);
+        assert!(craft.observe().e_norm < 1e-3, "{:?}", craft.observe());
+        assert!((1..100).contains(&craft.warnings()[1].count), "{:?}", craft.warnings());
+    }
+
+    #[test]
+    fn the_mirror_image_does_the_mirror_image() {
+        let slip = |sign: f64| SideSlip { mean: sign * 0.2, amplitude: sign * 0.3, ..WEAVING };
+        let start = |sign: f64| State { x: 5.5, y: sign * -0.5, heading: sign, surge: 0.3, ..State::default() };
+        let mut left = craft(circle(Turn::Left), slip(1.0), start(1.0));
+        let mut right = craft(circle(Turn::Right), slip(-1.0), start(-1.0));
+        for chunk in 0..10 {
+            fly(&mut left, chunk * 100..chunk * 100 + 100);
+            fly(&mut right, chunk * 100..chunk * 100 + 100);
+            let (one, two) = (left.observe(), right.observe());
+            assert!((one.e_cross + two.e_cross).abs() < 1e-9 && (one.psi_e + two.psi_e).abs() < 1e-9);
+            assert!((one.xi - two.xi).abs() < 1e-9 && (one.speed - two.speed).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn it_takes_accelerations_and_eta_is_of_the_total_speed() {
+        let law = Proposition33::new(Gains::default(), 1.0).unwrap();
+        let state = State { surge: 0.3, sway: 0.4, ..State::default() };
+        let line = Arc::new(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap());
+        let mut craft =
+            MarineCraft::new(line, law, SpeedLoop::Acceleration, SideSlip::NONE, PARAMETERS, state, 0.0).unwrap();
+        assert_eq!(craft.takes(), DemandKind::Acceleration);
+        let eta = craft.own(REFERENCE).eta;
+        assert!((eta - 0.3).abs() < 1e-15);
+        craft.command(REFERENCE, Demand::Acceleration(0.2));
+        craft.advance(1e-5, 1);
+        assert!(((craft.own(REFERENCE).eta - eta) / 1e-5 - 0.2).abs() < 1e-4);
+    }
+
+    #[test]
+    fn limits_disturbances_and_paths_in_space() {
+        let line = || Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
+        let mut weak =
+            craft(line(), SideSlip::NONE, State::default()).limited(Limits { force: 1.0, torque: 1.0, ..Limits::NONE });
+        fly(&mut weak, 0..50);
+        assert!(weak.warnings()[0].count > 0 && weak.observe().speed < 0.01);
+        let mut adrift = craft(line(), SideSlip::NONE, State::default());
+        let errors = InstrumentErrors { position: Vector3::y(), ..InstrumentErrors::default() };
+        adrift.conditions = Conditions {
+            current: Some(Vector3::y()),
+            errors: Some(errors),
+            stuck_speed: Some(0.2),
+            ..adrift.conditions
+        };
+        fly(&mut adrift, 0..1);
+        let seen = adrift.observe();
+        assert!((seen.e_cross - 0.02).abs() < 1e-6 && adrift.state.surge == 0.2, "{seen:?}");
+        assert!(adrift.held.input.torque < 0.0, "it thinks that it is to the left");
+        let law = Proposition33::new(Gains::default(), 1.0).unwrap();
+        let helix = Arc::new(Helix::new(5.0, 9.0, 0.0, 0.1, 0.0).unwrap());
+        let refused =
+            MarineCraft::new(helix, law, SpeedLoop::Acceleration, SideSlip::NONE, PARAMETERS, State::default(), 0.0);
+        assert!(refused.unwrap_err().contains("plane"));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(8))]
+
+        #[test]
+        fn turning_and_moving_the_world_changes_nothing(turn in -3.0..3.0f64, east in -9.0..9.0f64) {
+            let (sin, cos) = turn.sin_cos();
+            let make = |x: f64, y: f64, heading: f64, centre: Vector3<f64>, angle: f64| {
+                let path = Circle::new(centre, 5.0, Turn::Left, angle, 1.0).unwrap();
+                let mut craft = craft(path, WEAVING, State { x, y, heading, surge: 0.3, ..State::default() });
+                fly(&mut craft, 0..500);
+                craft.observe()
+            };
+            let here = make(5.5, 1.0, 1.0, Vector3::zeros(), 0.0);
+            let there = make(east + 5.5 * cos - sin, 5.5 * sin + cos, 1.0 + turn, Vector3::new(east, 0.0, 0.0), turn);
+            prop_assert!((here.e_cross - there.e_cross).abs() < 1e-9 && (here.xi - there.xi).abs() < 1e-9);
+            prop_assert!((here.psi_e - there.psi_e).abs() < 1e-9 && (here.speed - there.speed).abs() < 1e-12);
+        }
+    }
+}
