@@ -29,7 +29,7 @@ pub enum Loss {
         /// The common fade.
         common: TwoStates,
         /// The stream of the common fade, the same for all links.
-        common_stream: Stream,
+        common_stream: Box<Stream>,
         /// The link's own.
         own: TwoStates,
         /// 0 to 1.
@@ -108,7 +108,12 @@ mod tests {
 
     fn shared(share: f64, burst: f64, correlation: f64) -> Loss {
         let states = TwoStates::with_share(share, burst);
-        Loss::SharedFades { common: states.clone(), common_stream: Stream::new(9, "fades"), own: states, correlation }
+        Loss::SharedFades {
+            common: states.clone(),
+            common_stream: Box::new(Stream::new(9, "fades")),
+            own: states,
+            correlation,
+        }
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub(super) fn check(faults: &mut Collector<'_>, key: &str, loss: &LossChoice, se
                 faults.number(&format!("{key}.mean_burst"), f.mean_burst, burst_ok, &allowed);
             }
             let own = TwoStates::with_share(f.probability, f.mean_burst);
-            let common_stream = Stream::new(seed, FADES);
+            let common_stream = Box::new(Stream::new(seed, FADES));
             Some(Loss::SharedFades { common: own.clone(), common_stream, own, correlation: f.correlation })
         }
         LossChoice::Trace(trace) => {

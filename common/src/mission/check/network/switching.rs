@@ -182,7 +182,8 @@ fn check_in_mean(
         faults.fault(key, "a window for some links only", "no links: all of them together are connected in mean");
     }
     let arcs: Vec<(usize, usize)> = scope.links.iter().map(|link| (link.to, link.from)).collect();
-    if !(2..=MOST_VEHICLES).contains(&scope.vehicles) || !(choice.dwell_s.is_finite() && choice.window_s.is_finite()) {
+    let numbers = choice.dwell_s.is_finite() && choice.window_s.is_finite();
+    if !numbers || !(2..=MOST_VEHICLES).contains(&scope.vehicles) {
         return Some(Switching::always(arcs.len()));
     }
     let (window, dwell) = (Span::from_secs(choice.window_s), Span::from_secs(choice.dwell_s));
