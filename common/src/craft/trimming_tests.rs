@@ -77,7 +77,8 @@ fn a_circle_is_followed_alike_in_either_sense() {
         let mut left = craft(circle(2.0, Turn::Left), law(1.0), [2.2, 0.0, FRAC_PI_2 + 0.1, 0.2]);
         let mut right = craft(circle(2.0, Turn::Right), law(1.0), [2.2, 0.0, -FRAC_PI_2 - 0.1, 0.2]);
         for _ in 0..40 {
-            (alone(&mut left, 1.0), alone(&mut right, 1.0));
+            alone(&mut left, 1.0);
+            alone(&mut right, 1.0);
             let (one, two) = (left.observe(), right.observe());
             assert!(
                 (one.e_cross + two.e_cross).abs() < 1e-9 && (one.psi_e + two.psi_e).abs() < 1e-9,
@@ -276,7 +277,8 @@ proptest! {
         let (sin, cos) = turn.sin_cos();
         let there = [east - 0.1 * sin, north + 0.1 * cos, 0.2 + turn, 0.2];
         let mut there = craft(path(Vector3::new(east, north, 0.0), turn), law(1.0), there);
-        (alone(&mut here, 6.0), alone(&mut there, 6.0));
+        alone(&mut here, 6.0);
+        alone(&mut there, 6.0);
         let (one, two) = (here.observe(), there.observe());
         prop_assert!((one.xi - two.xi).abs() < 1e-8 && (one.e_cross - two.e_cross).abs() < 1e-8);
         prop_assert!((one.psi_e - two.psi_e).abs() < 1e-8);

@@ -32,8 +32,8 @@ pub struct Deviation {
 impl Deviation {
     /// Whether the vehicle is so near the path's centre of curvature, or beyond, that 1 − d_e c_c is limited.
     pub fn is_singular(&self) -> bool {
-        // A comparison that what is no number fails.
-        !(1.0 - self.d_e * self.c_c >= LEAST_NEARNESS)
+        let nearness = 1.0 - self.d_e * self.c_c;
+        nearness < LEAST_NEARNESS || nearness.is_nan()
     }
 
     /// 1 − d_e c_c, at least [`LEAST_NEARNESS`].

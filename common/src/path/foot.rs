@@ -54,7 +54,7 @@ impl Foot {
             let (r, c_c) = (foot.point.r(), foot.point.curvature());
             // d/ds of the distance along the tangent is −(1 − d c_c).
             let nearness = 1.0 - across * c_c;
-            if !(nearness >= LEAST_NEARNESS && r > 0.0) {
+            if nearness < LEAST_NEARNESS || nearness.is_nan() || r <= 0.0 {
                 break;
             }
             // Not more than a radian at a time, beyond which the circle bends back.
