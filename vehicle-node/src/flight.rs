@@ -216,17 +216,18 @@ impl Flight {
         self.expose(tick);
         let reference = self.speed.at(t);
         let pattern = self.mission.vehicles[self.me].pattern.at(t);
-        let law = &self.law;
         if self.rejoining
-            && let Some(xi) = self.neighbours.formation_xi(t, |scalar| law.neighbour_rate(reference, scalar))
+            && let Some(xi) = self.neighbours.formation_xi(t, |scalar| self.law.neighbour_rate(reference, scalar))
         {
             self.craft.place_target(xi + pattern.h);
+            // What the law has gathered meanwhile was about another place.
+            self.law = self.mission.law.vehicle(self.me);
             self.rejoining = false;
         }
         let mut own = self.craft.own(reference);
         own.xi -= pattern.h;
         (own.h_dot, own.h_ddot) = (pattern.h_dot, pattern.h_ddot);
-        let present = self.neighbours.present(t, |scalar| law.neighbour_rate(reference, scalar));
+        let present = self.neighbours.present(t, |scalar| self.law.neighbour_rate(reference, scalar));
         let demand = self.law.demand(reference, &own, present);
         let heard = present.len() as u16;
         self.craft.command(reference, demand);
