@@ -13,6 +13,7 @@
 //! | late information | Theorem 4.3, Lemmas 4.4, 4.5; errata 4.1–4.3 | agreement at v_L* = v_L/(1 + kτ) | [`delay`] |
 //! | how fast, on a fixed network | (4.40) | the rightmost root | [`delay_rate`] |
 //! | coordination with a state of its own | Lemmas 4.2, 4.6, 4.7, Theorems 4.8, 4.9, (4.63)–(4.66); errata 4.19, 4.20 | V at (1 − α)λ_c − αλ_d, norms at half | [`lemma_4_6`] |
+//! | all of these over a run as measured | Definitions 4.3, 4.4, Theorems 4.4, 4.5, Lemma 4.7 | covered, not covered and by how much, or a defect | [`monitor`] |
 //!
 //! Quadratic functions such as V decay at twice the rate of the norms of errors (erratum 4.4). Rates of norms are what
 //! can be laid beside a measurement, so [`Verdict::norm_rate`] is always one of those.
@@ -26,6 +27,7 @@ pub mod gateway_2_35;
 pub mod lemma_1_1;
 pub mod lemma_4_6;
 pub mod linear_coordination;
+pub mod monitor;
 pub mod polynomial;
 pub mod proposition_3_4;
 pub mod proposition_3_6;

@@ -82,16 +82,16 @@ struct View<'a> {
 
 /// One panel under construction.
 #[derive(Default)]
-struct Panel {
-    plots: Vec<Plot>,
+pub(super) struct Panel {
+    pub(super) plots: Vec<Plot>,
     /// Every point that is drawn, to place the legend where there are few.
-    drawn: Vec<(f64, f64)>,
+    pub(super) drawn: Vec<(f64, f64)>,
     /// Names in the legend.
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
 }
 
 impl Panel {
-    fn line(&mut self, points: Vec<(f64, f64)>, style: impl FnOnce(LinePlot) -> LinePlot) {
+    pub(super) fn line(&mut self, points: Vec<(f64, f64)>, style: impl FnOnce(LinePlot) -> LinePlot) {
         self.drawn.extend(&points);
         self.plots.push(style(LinePlot::new().with_data(points)).into());
     }
@@ -106,7 +106,7 @@ impl Panel {
         self.plots.push(ScatterPlot::new().with_data([at]).with_color(colour).with_size(size).into());
     }
 
-    fn layout(&self, title: &str, x_label: &str, y_label: &str) -> Layout {
+    pub(super) fn layout(&self, title: &str, x_label: &str, y_label: &str) -> Layout {
         let mut layout = Layout::auto_from_plots(&self.plots)
             .with_title(title)
             .with_x_label(x_label)
@@ -320,7 +320,7 @@ impl View<'_> {
     }
 }
 
-fn colour(index: usize) -> &'static str {
+pub(super) fn colour(index: usize) -> &'static str {
     COLOURS[index % COLOURS.len()]
 }
 
@@ -342,7 +342,7 @@ fn theme() -> Theme {
     }
 }
 
-fn render(name: &str, rows: usize, columns: usize, panels: Vec<Drawing>) -> String {
+pub(super) fn render(name: &str, rows: usize, columns: usize, panels: Vec<Drawing>) -> String {
     let (plots, layouts) = panels.into_iter().unzip();
     let width = if columns == 1 { 1.6 * WIDTH } else { WIDTH };
     let grid = Grid::new(rows, columns).with_plots(plots).with_layouts(layouts).with_cell_size(width, HEIGHT);
