@@ -93,3 +93,36 @@ impl Gains {
         valid.then_some(Gains { n: gains.len(), k_m, k_max })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    #[test]
+    fn every_path_in_the_index_exists() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
+        let index = include_str!("../../../docs/theory.md");
+        let quoted = index.split('`').skip(1).step_by(2).filter(|text| text.ends_with(".rs"));
+        let (mut count, mut missing) = (0, Vec::new());
+        for path in quoted {
+            let found = root.join("common/src").join(path).exists() || root.join(path).exists();
+            // A module is a file or a folder, as it grows.
+            let folder = root.join("common/src").join(path.trim_end_matches(".rs")).join("mod.rs").exists();
+            if !(found || folder) {
+                missing.push(path);
+            }
+            count += 1;
+        }
+        assert!(count > 40 && missing.is_empty(), "{count} paths, missing: {missing:?}");
+    }
+
+    #[test]
+    fn every_file_about_theory_is_in_the_index() {
+        let index = include_str!("../../../docs/theory.md");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/theory");
+        for entry in std::fs::read_dir(folder).expect("lists") {
+            let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
+            assert!(index.contains(&format!("`theory/{name}`")), "{name} is not in docs/theory.md");
+        }
+    }
+}
