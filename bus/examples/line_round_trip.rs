@@ -9,7 +9,7 @@
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command};
-use std::sync::mpsc::Receiver;
+
 use std::time::{Duration, Instant};
 
 use bus::Plane;

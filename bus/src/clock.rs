@@ -1,10 +1,9 @@
-//! The wall clock, and waiting on it.
+//! The wall clock.
 //!
 //! All processes of a fleet share one start instant in UNIX time. Each reads the system's clock once, when its
 //! [`RealClock`] is made, and then only the monotonic clock: a step of the system's clock in mid-mission moves nobody.
 
 use std::num::NonZeroU64;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant, SystemTime};
 
 use common::time::Time;
@@ -104,44 +103,10 @@ pub fn sharpen_this_thread() {
     }
 }
 
-/// What ended a wait.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wake<T> {
-    /// A message arrived.
-    Message(T),
-    /// The deadline has passed, and no message was waiting.
-    Deadline,
-    /// All senders are gone.
-    Closed,
-}
-
-/// Waits for a message until a deadline (`None`: without end). Never returns [`Wake::Deadline`] early, and prefers a
-/// waiting message even when the deadline has passed.
-pub fn recv_until<T>(receiver: &Receiver<T>, deadline: Option<Instant>) -> Wake<T> {
-    match receiver.try_recv() {
-        Ok(message) => return Wake::Message(message),
-        Err(TryRecvError::Disconnected) => return Wake::Closed,
-        Err(TryRecvError::Empty) => {}
-    }
-    let Some(deadline) = deadline else {
-        return receiver.recv().map_or(Wake::Closed, Wake::Message);
-    };
-    loop {
-        let left = deadline.saturating_duration_since(Instant::now());
-        match receiver.recv_timeout(left) {
-            Ok(message) => return Wake::Message(message),
-            Err(RecvTimeoutError::Disconnected) => return Wake::Closed,
-            Err(RecvTimeoutError::Timeout) if Instant::now() >= deadline => return Wake::Deadline,
-            Err(RecvTimeoutError::Timeout) => {}
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::sync::mpsc;
 
     #[test]
     fn mission_time_starts_at_the_shared_start_and_runs_at_its_speed() {
@@ -180,31 +145,6 @@ mod tests {
         assert_eq!(clock.lateness(Time::from_secs(1e6)), Duration::ZERO);
         let late = clock.lateness(Time::from_secs(10.0)).as_secs_f64();
         assert!((5.0..60.0).contains(&late), "{late}");
-    }
-
-    #[test]
-    fn a_wait_never_ends_early() {
-        let (_sender, receiver) = mpsc::channel::<()>();
-        sharpen_this_thread();
-        for micros in [0, 1, 50, 300, 2_000] {
-            let deadline = Instant::now() + Duration::from_micros(micros);
-            assert_eq!(recv_until(&receiver, Some(deadline)), Wake::Deadline);
-            assert!(Instant::now() >= deadline);
-        }
-    }
-
-    #[test]
-    fn a_waiting_message_comes_before_a_passed_deadline_and_closing_after_the_last_message() {
-        let (sender, receiver) = mpsc::channel();
-        sender.send(1).expect("open");
-        sender.send(2).expect("open");
-        let passed = Some(Instant::now());
-        assert_eq!(recv_until(&receiver, passed), Wake::Message(1));
-        assert_eq!(recv_until(&receiver, None), Wake::Message(2));
-        assert_eq!(recv_until(&receiver, passed), Wake::Deadline);
-        drop(sender);
-        assert_eq!(recv_until(&receiver, None), Wake::Closed);
-        assert_eq!(recv_until(&receiver, passed), Wake::Closed);
     }
 
     proptest! {

@@ -77,6 +77,31 @@ impl StopFlag {
     }
 }
 
+/// Whether the process that holds the other end of standard input is gone.
+#[derive(Clone, Debug, Default)]
+pub struct Parent(Arc<AtomicBool>);
+
+impl Parent {
+    /// Watches standard input, on a thread that ends with it.
+    pub fn at_stdin() -> Parent {
+        let gone = Arc::<AtomicBool>::default();
+        let tell = Arc::clone(&gone);
+        let watch = move || {
+            let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+            tell.store(true, Ordering::Relaxed);
+        };
+        if let Err(error) = std::thread::Builder::new().name("parent".into()).spawn(watch) {
+            tracing::debug!("the parent is not watched: {error}");
+        }
+        Parent(gone)
+    }
+
+    /// Whether it is gone.
+    pub fn is_gone(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
 /// The host's name as a vehicle's name: lower case, and a dash for what may not be in one.
 pub fn host_name() -> String {
     let uname = rustix::system::uname();

@@ -62,9 +62,12 @@ impl Counter {
     pub(crate) fn add_one(&self) -> u64 {
         self.0.fetch_add(1, Ordering::Relaxed) + 1
     }
-    /// Undoes one [`add_one`](Self::add_one).
-    pub(crate) fn take_back(&self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
+    pub(crate) fn add(&self, count: u64) {
+        self.0.fetch_add(count, Ordering::Relaxed);
+    }
+    /// Undoes so many [`add_one`](Self::add_one)s.
+    pub(crate) fn take_back(&self, count: u64) {
+        self.0.fetch_sub(count, Ordering::Relaxed);
     }
     pub(crate) fn get(&self) -> u64 {
         self.0.load(Ordering::Relaxed)

@@ -3,17 +3,22 @@
 //!
 //! It runs on the thread that calls it, with absolute deadlines and a sharpened timer, away from every async runtime.
 
-use std::sync::mpsc::Receiver;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
 use common::machine::Machine;
 use common::time::Time;
 use common::wire::vehicle::ClockPlan;
 
-use crate::clock::{RealClock, Wake, recv_until, sharpen_this_thread};
+use crate::clock::{RealClock, sharpen_this_thread};
+use crate::queue::{Events, Wake};
 
 /// How often a program looks after its files and signals even if nothing happens.
 const TEND_PERIOD: Duration = Duration::from_millis(100);
+
+/// How many messages are handled before what they led to is sent.
+const HELPING: usize = 256;
 
 /// Mission time as a program sees it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -86,6 +91,11 @@ pub trait Port {
     /// Does what the machine wants; may answer it at once, or end the program.
     fn perform(&mut self, output: Output<Self>, clock: &mut Clock) -> Next<Self>;
 
+    /// Sends what was kept back to be sent together, or says when to ask again; called before every wait.
+    fn flush(&mut self, _now: Instant) -> Option<Instant> {
+        None
+    }
+
     /// Looks after files and signals; called every 100 ms or more often.
     fn tend(&mut self, machine: &Self::Machine) -> Next<Self>;
 
@@ -141,55 +151,151 @@ impl Rest {
     }
 }
 
-/// Runs a program until its port ends it.
-pub fn drive<P: Port>(
-    machine: &mut P::Machine,
-    port: &mut P,
-    clock: &mut Clock,
-    events: &Receiver<P::Event>,
-) -> P::Exit {
-    sharpen_this_thread();
-    let mut tend_at = Instant::now() + TEND_PERIOD;
-    loop {
-        if let Some(exit) = carry_out(machine, port, clock) {
-            return exit;
+/// A program: its machine, and what carries out what the machine wants.
+pub struct Program<P: Port> {
+    /// What decides.
+    pub machine: P::Machine,
+    /// What carries out.
+    pub port: P,
+    clock: Clock,
+    exit: Option<P::Exit>,
+    /// When the loop will look again by itself; in the past while it is awake.
+    awake_at: Instant,
+}
+
+impl<P: Port> Program<P> {
+    /// A program that has this clock.
+    pub fn new(machine: P::Machine, port: P, clock: Clock) -> Program<P> {
+        Program { machine, port, clock, exit: None, awake_at: Instant::now() }
+    }
+
+    /// What happened at a moment is decided and carried out, and so is what is due by now. True if the loop sleeps for
+    /// longer than the machine wants, and must be woken.
+    ///
+    /// For who holds the program outside its loop: a message that arrives needs no thread to be woken for it.
+    pub fn at_once(&mut self, at: Instant, input: Input<P>) -> bool {
+        self.machine.handle(self.clock.time_at(at), Some(input));
+        self.carry_out();
+        self.meet_deadline();
+        self.exit.is_some() || self.deadline().is_some_and(|deadline| deadline < self.awake_at)
+    }
+
+    fn take(&mut self, event: P::Event) {
+        if let Some((at, input)) = self.port.translate(event) {
+            let now = at.map_or_else(|| self.clock.now(), |at| self.clock.time_at(at));
+            self.machine.handle(now, Some(input));
+            self.carry_out();
         }
-        let deadline = machine.poll_timeout().and_then(|time| clock.instant_of(time));
-        let wake = deadline.map_or(tend_at, |deadline| deadline.min(tend_at));
-        match recv_until(events, Some(wake)) {
-            Wake::Closed => return port.closed(),
-            Wake::Deadline => {}
-            Wake::Message(event) => {
-                if let Some((at, input)) = port.translate(event) {
-                    let now = at.map_or_else(|| clock.now(), |at| clock.time_at(at));
-                    machine.handle(now, Some(input));
-                }
+    }
+
+    /// Calls the machine if it is time.
+    fn meet_deadline(&mut self) {
+        if let (Clock::Real(clock), Some(time)) = (self.clock, self.machine.poll_timeout()) {
+            let now = clock.now();
+            if time <= now {
+                self.machine.handle(now, None);
+                self.carry_out();
             }
         }
-        // Also after a message: a flood of them must not starve the machine of its deadlines.
-        let moment = Instant::now();
-        if deadline.is_some_and(|deadline| deadline <= moment) {
-            machine.handle(clock.now(), None);
-        }
-        if moment >= tend_at {
-            tend_at = moment + TEND_PERIOD;
-            match port.tend(machine) {
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.machine.poll_timeout().and_then(|time| self.clock.instant_of(time))
+    }
+
+    /// Carries out everything that the machine wants.
+    fn carry_out(&mut self) {
+        while self.exit.is_none()
+            && let Some(output) = self.machine.poll_output()
+        {
+            match self.port.perform(output, &mut self.clock) {
                 Next::Go => {}
-                Next::Feed(input) => machine.handle(clock.now(), Some(input)),
-                Next::Exit(exit) => return exit,
+                Next::Feed(input) => self.machine.handle(self.clock.now(), Some(input)),
+                Next::Exit(exit) => self.exit = Some(exit),
             }
+        }
+    }
+
+    /// Looks after files and signals.
+    fn tend(&mut self) {
+        match self.port.tend(&self.machine) {
+            Next::Go => {}
+            Next::Feed(input) => {
+                self.machine.handle(self.clock.now(), Some(input));
+                self.carry_out();
+            }
+            Next::Exit(exit) => self.exit = Some(exit),
         }
     }
 }
 
-/// Carries out everything the machine wants.
-fn carry_out<P: Port>(machine: &mut P::Machine, port: &mut P, clock: &mut Clock) -> Option<P::Exit> {
-    while let Some(output) = machine.poll_output() {
-        match port.perform(output, clock) {
-            Next::Go => {}
-            Next::Feed(input) => machine.handle(clock.now(), Some(input)),
-            Next::Exit(exit) => return Some(exit),
+/// A program that one thread can hold at a time.
+pub struct Shared<P: Port> {
+    program: Mutex<Program<P>>,
+    /// The loop waits for the program. A lock knows no turns: without this, who takes it again and again would not let the
+    /// loop have it.
+    wanted: AtomicBool,
+}
+
+impl<P: Port> Shared<P> {
+    /// A program that nobody holds.
+    pub fn new(program: Program<P>) -> Shared<P> {
+        Shared { program: Mutex::new(program), wanted: AtomicBool::new(false) }
+    }
+
+    /// Waits until nobody else holds it. A thread that panicked with it must not take it along.
+    pub fn hold(&self) -> MutexGuard<'_, Program<P>> {
+        self.wanted.store(true, Ordering::Relaxed);
+        let program = self.program.lock().unwrap_or_else(PoisonError::into_inner);
+        self.wanted.store(false, Ordering::Relaxed);
+        program
+    }
+
+    /// Holds it if that takes no waiting, and nobody waits.
+    pub fn try_hold(&self) -> Option<MutexGuard<'_, Program<P>>> {
+        if self.wanted.load(Ordering::Relaxed) { None } else { self.program.try_lock().ok() }
+    }
+
+    /// The program's port, when its loop has ended.
+    pub fn into_port(self) -> P {
+        self.program.into_inner().unwrap_or_else(PoisonError::into_inner).port
+    }
+}
+
+/// Runs a program until its port ends it. It lets go of the program while it waits.
+pub fn drive<P: Port>(program: &Shared<P>, events: &Events<P::Event>) -> P::Exit {
+    sharpen_this_thread();
+    let mut tend_at = Instant::now() + TEND_PERIOD;
+    program.hold().carry_out();
+    loop {
+        let (wake, gathering) = {
+            let mut program = program.hold();
+            for _ in 0..HELPING {
+                let Some(event) = events.pop() else { break };
+                program.take(event);
+                // Also after a message: a flood of them must not starve the machine of its deadlines.
+                program.meet_deadline();
+                if program.exit.is_some() {
+                    break;
+                }
+            }
+            program.meet_deadline();
+            let moment = Instant::now();
+            if moment >= tend_at {
+                tend_at = moment + TEND_PERIOD;
+                program.tend();
+            }
+            let send_at = program.port.flush(moment);
+            if let Some(exit) = program.exit.take() {
+                return exit;
+            }
+            let wake = program.deadline().map_or(tend_at, |deadline| deadline.min(tend_at));
+            let wake = send_at.map_or(wake, |send_at| send_at.min(wake));
+            program.awake_at = wake;
+            (wake, send_at.is_some())
+        };
+        if events.wait(Some(wake), gathering) == Wake::Closed {
+            return program.hold().port.closed();
         }
     }
-    None
 }

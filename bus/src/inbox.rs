@@ -1,41 +1,43 @@
 //! The receiving half of one line, the same at both ends: from the transport's callbacks into the program's queue.
 //!
-//! Callbacks run on the transport's own threads, so nothing here waits: what finds the queue full is dropped and
+//! Callbacks run on the transport's own threads, so nothing here waits: what finds no room in the queue is dropped and
 //! counted. A gate is shut until the two ends have shaken hands, and again when the line is lost, so that a program
 //! sees every packet after the line's beginning and before its end.
 
-use std::sync::mpsc::{SyncSender, TrySendError};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use crate::counts::Tally;
 use crate::outbox::{ACK_EVERY, Outbox};
-use crate::plane::{Assembled, Assembly, Frame, Plane, cost};
+use crate::plane::{Assembled, Assembly, BUNDLE, Frame, Plane, cost, unbundle};
+use crate::queue::{Feed, Refused};
+
+/// Who may take a state-plane packet at once, on the transport's thread; true if it was taken.
+pub(crate) type Shortcut = dyn Fn(Instant, &[u8]) -> bool + Send + Sync;
 
 /// One end of a line, receiving: `E` is the program's event.
 pub(crate) struct Inbox<E> {
-    events: SyncSender<E>,
+    events: Feed<E>,
     packet: Box<dyn Fn(Plane, Instant, Vec<u8>) -> E + Send + Sync>,
+    shortcut: OnceLock<Box<Shortcut>>,
+    phase: AtomicU8,
     gate: Mutex<Gate>,
     tally: Arc<Tally>,
     pub(crate) outbox: Outbox,
 }
 
+/// The phases of a gate. It is changed under the lock, and looked at without.
+const WAITING: u8 = 0;
+const OPEN: u8 = 1;
+const CLOSED: u8 = 2;
+
 #[derive(Debug, Default)]
 struct Gate {
-    phase: Phase,
     assembly: Assembly,
     /// What has arrived on the mission plane, as [`cost`] counts, and how much of it was acknowledged.
     taken: u64,
     acknowledged: u64,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Phase {
-    #[default]
-    Waiting,
-    Open,
-    Closed,
 }
 
 /// A frame that concerns the line itself.
@@ -47,62 +49,107 @@ pub(crate) enum Handshake {
 
 impl<E> Inbox<E> {
     pub(crate) fn new(
-        events: SyncSender<E>,
+        events: Feed<E>,
         outbox: Outbox,
         tally: Arc<Tally>,
         packet: impl Fn(Plane, Instant, Vec<u8>) -> E + Send + Sync + 'static,
     ) -> Inbox<E> {
-        Inbox { events, packet: Box::new(packet), gate: Mutex::default(), tally, outbox }
+        let (shortcut, phase, gate) = (OnceLock::new(), AtomicU8::new(WAITING), Mutex::default());
+        Inbox { events, packet: Box::new(packet), shortcut, phase, gate, tally, outbox }
+    }
+
+    /// Lets state-plane packets be taken before they are queued.
+    pub(crate) fn set_shortcut(&self, shortcut: Box<Shortcut>) {
+        // There is one in the life of a line.
+        let _ = self.shortcut.set(shortcut);
     }
 
     fn lock(&self) -> MutexGuard<'_, Gate> {
         self.gate.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn phase(&self) -> u8 {
+        self.phase.load(Ordering::Acquire)
+    }
+
     /// Whether messages may pass.
     pub(crate) fn is_open(&self) -> bool {
-        self.lock().phase == Phase::Open
+        self.phase() == OPEN
     }
 
     /// Whether the two ends have not shaken hands yet.
     pub(crate) fn is_waiting(&self) -> bool {
-        self.lock().phase == Phase::Waiting
+        self.phase() == WAITING
     }
 
     /// Opens the gate, announcing it by `event` and then doing `then` before anything else passes; false if the
     /// program's queue has no room for the event, or the line is closed.
     pub(crate) fn open(&self, event: E, then: impl FnOnce()) -> bool {
-        let mut gate = self.lock();
-        match gate.phase {
-            Phase::Open => return true,
-            Phase::Closed => return false,
-            Phase::Waiting => {}
+        let _gate = self.lock();
+        match self.phase() {
+            OPEN => return true,
+            WAITING => {}
+            _ => return false,
         }
-        if self.events.try_send(event).is_err() {
+        if self.events.lasting(event).is_err() {
             return false;
         }
         then();
-        gate.phase = Phase::Open;
+        self.phase.store(OPEN, Ordering::Release);
         true
     }
 
     /// Shuts the gate for good; true if it was open.
     pub(crate) fn close(&self) -> bool {
-        let mut gate = self.lock();
+        let _gate = self.lock();
         self.outbox.close();
-        std::mem::replace(&mut gate.phase, Phase::Closed) == Phase::Open
+        self.phase.swap(CLOSED, Ordering::AcqRel) == OPEN
     }
 
-    /// A state-plane message has arrived.
-    pub(crate) fn on_state(&self, bytes: &[u8]) {
+    /// A bundle of state-plane messages has arrived.
+    pub(crate) fn on_state(&self, mut bytes: &[u8]) {
         let at = Instant::now();
-        if bytes.len() > Plane::State.limit() {
+        if bytes.len() > BUNDLE + Plane::State.limit() {
             self.tally.oversized.add_one();
             return;
         }
-        let gate = self.lock();
-        if gate.phase == Phase::Open {
-            self.deliver(Plane::State, at, bytes.to_vec());
+        // Not under the lock: who takes it may send on this very line.
+        while let Some(shortcut) = self.shortcut.get()
+            && self.is_open()
+            && let Some((message, rest)) = unbundle(bytes)
+        {
+            self.tally.state_in.add(1);
+            if !shortcut(at, message) {
+                self.tally.state_in.take_back(1);
+                break;
+            }
+            bytes = rest;
+        }
+        if bytes.is_empty() {
+            return;
+        }
+        let _gate = self.lock();
+        if !self.is_open() {
+            return;
+        }
+        let mut came = 0;
+        let messages = std::iter::from_fn(|| {
+            let (message, rest) = unbundle(bytes)?;
+            bytes = rest;
+            came += 1;
+            // Before the program can see the message, so that it never finds a count behind what it holds.
+            self.tally.state_in.add(1);
+            Some((self.packet)(Plane::State, at, message.to_vec()))
+        });
+        match self.events.droppable(messages) {
+            Some(dropped) => {
+                self.tally.state_in.take_back(dropped);
+                self.tally.state_dropped.add(dropped);
+            }
+            None => self.tally.state_in.take_back(came),
+        }
+        if !bytes.is_empty() {
+            self.tally.garbage.add_one();
         }
     }
 
@@ -125,25 +172,25 @@ impl<E> Inbox<E> {
             Some(Frame::Hello { nonce }) => return Some(Handshake::Hello(nonce)),
             Some(Frame::Welcome { nonce }) => return Some(Handshake::Welcome(nonce)),
             Some(Frame::AckNow | Frame::Ack { .. }) => {}
-            Some(Frame::Whole(message)) if gate.phase == Phase::Open => {
+            Some(Frame::Whole(message)) if self.is_open() => {
                 if gate.assembly.abandon() {
                     self.tally.garbage.add_one();
                 }
-                self.deliver(Plane::Mission, at, message.to_vec());
+                self.deliver(at, message.to_vec());
             }
-            Some(Frame::Part { message, index, total, piece }) if gate.phase == Phase::Open => {
+            Some(Frame::Part { message, index, total, piece }) if self.is_open() => {
                 if index == 0 && gate.assembly.abandon() {
                     self.tally.garbage.add_one();
                 }
                 match gate.assembly.add(message, index, total, piece) {
-                    Assembled::Done(message) => self.deliver(Plane::Mission, at, message),
+                    Assembled::Done(message) => self.deliver(at, message),
                     Assembled::Waiting => {}
                     Assembled::Garbage => {
                         self.tally.garbage.add_one();
                     }
                 }
             }
-            Some(Frame::Whole(_) | Frame::Part { .. }) if gate.phase == Phase::Closed => {}
+            Some(Frame::Whole(_) | Frame::Part { .. }) if self.phase() == CLOSED => {}
             _ => {
                 self.tally.garbage.add_one();
             }
@@ -151,25 +198,19 @@ impl<E> Inbox<E> {
         None
     }
 
-    /// The caller holds the gate.
-    fn deliver(&self, plane: Plane, at: Instant, bytes: Vec<u8>) {
-        let (delivered, dropped) = match plane {
-            Plane::State => (&self.tally.state_in, &self.tally.state_dropped),
-            Plane::Mission => (&self.tally.mission_in, &self.tally.mission_dropped),
-        };
-        // Before the program can see the message, so that it never finds a count behind what it holds.
-        delivered.add_one();
-        match self.events.try_send((self.packet)(plane, at, bytes)) {
+    /// Takes a message of the mission plane; the caller holds the gate.
+    fn deliver(&self, at: Instant, bytes: Vec<u8>) {
+        self.tally.mission_in.add_one();
+        match self.events.lasting((self.packet)(Plane::Mission, at, bytes)) {
             Ok(()) => {}
-            Err(TrySendError::Full(_)) => {
-                delivered.take_back();
-                let so_far = dropped.add_one();
-                if plane == Plane::Mission && so_far.is_power_of_two() {
+            Err(Refused::Full) => {
+                self.tally.mission_in.take_back(1);
+                let so_far = self.tally.mission_dropped.add_one();
+                if so_far.is_power_of_two() {
                     tracing::error!("the program does not empty its queue: {so_far} mission messages are lost");
                 }
             }
-            // The program listens no more.
-            Err(TrySendError::Disconnected(_)) => delivered.take_back(),
+            Err(Refused::Nobody) => self.tally.mission_in.take_back(1),
         }
     }
 }

@@ -19,6 +19,7 @@ pub mod drive;
 pub mod line;
 pub mod logs;
 pub mod plane;
+pub mod queue;
 pub mod recording;
 pub mod setup;
 pub mod switchboard;

@@ -6,7 +6,7 @@
 
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, SyncSender};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -21,6 +21,7 @@ use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
 use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
+use crate::queue::{Events, Feed, queue};
 use crate::setup::{self, Endpoint, LEASE};
 
 /// How often a hub that is not there is looked for.
@@ -47,7 +48,8 @@ pub struct LineConfig {
     pub id: String,
     /// How long to wait for the hub; `None` is for ever.
     pub patience: Option<Duration>,
-    /// The most events that wait for the program; beyond, packets are dropped and counted.
+    /// The most packets of each plane that wait for the program; beyond, the oldest states and the newest others are
+    /// dropped and counted.
     pub queue: usize,
 }
 
@@ -119,10 +121,10 @@ impl Line {
     ///
     /// Ends with an error if the hub refuses, or does not appear within the patience. That the identity is in use is
     /// believed only after two and a half seconds: it may be this participant's own ghost, killed a moment ago.
-    pub fn connect(config: LineConfig) -> Result<(Line, Receiver<LineEvent>)> {
+    pub fn connect(config: LineConfig) -> Result<(Line, Events<LineEvent>)> {
         check_id(&config.id).map_err(Error::Refused)?;
-        let (events, receiver) = mpsc::sync_channel(config.queue.max(2));
-        let (signals, queue) = mpsc::channel();
+        let (events, receiver) = queue(config.queue);
+        let (signals, orders) = mpsc::channel();
         let shared = Arc::new(Shared { id: config.id, tally: Arc::default(), inbox: Mutex::default() });
         let mut keeper = Keeper {
             endpoint: config.endpoint,
@@ -131,10 +133,10 @@ impl Line {
             shared: Arc::clone(&shared),
             events,
             signals: signals.clone(),
-            queue,
+            orders,
             link: None,
         };
-        keeper.join_hub(config.patience)?;
+        keeper.join_hub(config.patience, Duration::ZERO)?;
         let keeper = std::thread::Builder::new()
             .name("bus-line".into())
             .spawn(move || keeper.keep())
@@ -205,9 +207,9 @@ struct Keeper {
     endpoint: Endpoint,
     nonce: u64,
     shared: Arc<Shared>,
-    events: SyncSender<LineEvent>,
+    events: Feed<LineEvent>,
     signals: Sender<Signal>,
-    queue: Receiver<Signal>,
+    orders: Receiver<Signal>,
     link: Option<Link>,
 }
 
@@ -232,18 +234,19 @@ enum Setback {
 impl Keeper {
     fn keep(mut self) {
         loop {
-            match self.queue.recv() {
+            match self.orders.recv() {
                 Ok(Signal::HubGone(number)) if self.link.as_ref().is_some_and(|link| link.number == number) => {
                     tracing::warn!("{}: the network-emulator is gone; looking for it", self.shared.id);
                     self.hang_up();
-                    if self.events.send(LineEvent::Lost).is_err() {
+                    if !self.events.announce(LineEvent::Lost) {
                         return;
                     }
-                    match self.join_hub(None) {
+                    // That it is looked for was said.
+                    match self.join_hub(None, REMINDER) {
                         Ok(()) => tracing::info!("{}: the network-emulator is back", self.shared.id),
                         Err(Error::Refused(refusal)) => {
                             tracing::error!("{}: the network-emulator is back, but {refusal}", self.shared.id);
-                            let _ = self.events.send(LineEvent::Refused(refusal));
+                            self.events.announce(LineEvent::Refused(refusal));
                             return;
                         }
                         Err(_) => return,
@@ -266,10 +269,10 @@ impl Keeper {
         }
     }
 
-    /// Tries until it works, the patience ends, the hub's refusal is final, or the program closes the line.
-    fn join_hub(&mut self, patience: Option<Duration>) -> Result<()> {
+    /// Tries until it works, at first in silence, the patience ends, the hub's refusal is final, or the program closes the line.
+    fn join_hub(&mut self, patience: Option<Duration>, silence: Duration) -> Result<()> {
         let begun = Instant::now();
-        let mut reminder = begun;
+        let mut reminder = begun + silence;
         let mut taken_since: Option<Instant> = None;
         loop {
             let left = patience.map_or(STEP, |patience| patience.saturating_sub(begun.elapsed()));
@@ -307,7 +310,7 @@ impl Keeper {
     fn closing_within(&self, pause: Duration) -> bool {
         let until = Instant::now() + pause;
         loop {
-            match self.queue.recv_timeout(until.saturating_duration_since(Instant::now())) {
+            match self.orders.recv_timeout(until.saturating_duration_since(Instant::now())) {
                 Ok(Signal::Close) | Err(RecvTimeoutError::Disconnected) => return true,
                 Err(RecvTimeoutError::Timeout) => return false,
                 Ok(_) => {}
@@ -342,7 +345,7 @@ impl Keeper {
         let question = format!("{}?{}", join_key(&self.shared.id), request.encode());
         let replies = lobby.get(question).timeout(step).wait().map_err(|error| absent(&error.to_string()))?;
         let Ok(reply) = replies.recv() else {
-            return Err(absent("something listens there, but it is not a network-emulator"));
+            return Err(absent("something listens there, but does not answer as a network-emulator"));
         };
         match reply.result() {
             Ok(sample) => {
@@ -417,7 +420,7 @@ impl Keeper {
                 .map_err(|error| Setback::Absent(error.to_string()))?;
             let again = Instant::now() + HELLO_AGAIN;
             loop {
-                match self.queue.recv_timeout(again.saturating_duration_since(Instant::now())) {
+                match self.orders.recv_timeout(again.saturating_duration_since(Instant::now())) {
                     Ok(Signal::Welcomed(welcomed)) if welcomed == link.number => return Ok(()),
                     Ok(Signal::HubGone(gone)) if gone == link.number => {
                         return Err(Setback::Absent("the line was closed".into()));

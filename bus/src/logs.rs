@@ -4,19 +4,22 @@
 use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
 use common::mission::Mission;
-use common::record::{Record, Row, StateRow};
+use common::record::{ClockRecord, Name, NoteRow, Record, Row, Settled, StateRow};
 use common::wire::vehicle::LogPiece;
 
-use crate::recording::{FLUSH_PERIOD, Origin, Recorder, RowReader};
+use crate::recording::packed::{PACK, Pack};
+use crate::recording::{FLUSH_PERIOD, Origin, Recorder, RowReader, time_of};
 
-/// Rows that wait for the disk; beyond it the process waits too.
-const QUEUE: usize = 1 << 13;
+/// Helpings of rows that wait for the disk; beyond, the process waits too, and it is noted how often.
+const QUEUE: usize = 256;
+/// Rows in a helping: the thread that writes is not woken for each.
+const HELPING: usize = 64;
 /// Bytes of a log sent at a time.
 const PIECE: usize = 512 << 10;
 
@@ -35,8 +38,49 @@ pub struct Logs {
 
 struct Open {
     digest: u64,
-    rows: SyncSender<Row>,
+    to_disk: SyncSender<Helping>,
     writer: JoinHandle<()>,
+    /// The ends of each link, by index among the vehicles.
+    links: Vec<(usize, usize)>,
+    rows: Vec<Row>,
+    pack: Pack,
+    /// How often the disk was waited for.
+    waits: u64,
+    last_t_ns: i64,
+}
+
+/// What is handed to the thread that writes.
+enum Helping {
+    Rows(Vec<Row>),
+    Pack(Pack),
+}
+
+impl Open {
+    fn hand_over(&mut self, helping: Helping) {
+        match self.to_disk.try_send(helping) {
+            Ok(()) => {}
+            Err(TrySendError::Full(helping)) => {
+                self.waits += 1;
+                // The writer only ends after this end of the channel is dropped.
+                let _ = self.to_disk.send(helping);
+            }
+            Err(TrySendError::Disconnected(_)) => {}
+        }
+    }
+
+    fn hand_over_rows(&mut self) {
+        if !self.rows.is_empty() {
+            let rows = std::mem::take(&mut self.rows);
+            self.hand_over(Helping::Rows(rows));
+        }
+    }
+
+    fn hand_over_pack(&mut self) {
+        if !self.pack.bytes.is_empty() {
+            let pack = std::mem::take(&mut self.pack);
+            self.hand_over(Helping::Pack(pack));
+        }
+    }
 }
 
 impl Logs {
@@ -81,41 +125,81 @@ impl Logs {
         let (path, recorder) =
             Recorder::create_next(&folder, &self.stem, &origin(mission)).map_err(|error| refused(&error))?;
         tracing::debug!("recording in {}", path.display());
-        let (rows, queue) = sync_channel(QUEUE);
+        let (to_disk, queue) = sync_channel(QUEUE);
+        let vehicles = mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect::<Vec<_>>();
         let failure = Arc::clone(&self.failure);
         let writer = std::thread::Builder::new()
             .name("log".into())
             .spawn(move || {
-                if let Err(error) = write_rows(recorder, &queue) {
+                if let Err(error) = write_rows(recorder, &queue, &vehicles) {
                     *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                     // Rows go on coming; they must not block the one who sends them.
                     while queue.recv().is_ok() {}
                 }
             })
             .map_err(|error| refused(&error))?;
-        self.open = Some(Open { digest: mission.digest, rows, writer });
+        self.open = Some(Open {
+            digest: mission.digest,
+            to_disk,
+            writer,
+            links: mission.links.iter().map(|link| (link.from, link.to)).collect(),
+            rows: Vec::new(),
+            pack: Pack::default(),
+            waits: 0,
+            last_t_ns: 0,
+        });
         Ok(last)
     }
 
-    /// Records a row, if a log is open.
-    pub fn write(&self, row: Row) {
-        if let Some(open) = &self.open {
-            // The writer only ends after this end of the channel is dropped.
-            let _ = open.rows.send(row);
+    /// Records a row, if a log is open. It is handed to the disk with others, or with the next [`tend`](Logs::tend).
+    pub fn write(&mut self, row: Row) {
+        if let Some(open) = &mut self.open {
+            // What is in the pack came before it.
+            open.hand_over_pack();
+            open.last_t_ns = time_of(&row);
+            open.rows.push(row);
+            if open.rows.len() >= HELPING {
+                open.hand_over_rows();
+            }
         }
+    }
+
+    /// Records what became of a message, likewise.
+    pub fn settled(&mut self, settled: &Settled) {
+        if let Some(open) = &mut self.open
+            && let Some(&(from, to)) = open.links.get(settled.link)
+        {
+            open.hand_over_rows();
+            open.pack.add(settled, from, to);
+            open.last_t_ns = settled.t_ns;
+            if open.pack.bytes.len() >= PACK {
+                open.hand_over_pack();
+            }
+        }
+    }
+
+    /// Hands over what waits to be written; tells, once, why recording has stopped.
+    pub fn tend(&mut self) -> Option<String> {
+        if let Some(open) = &mut self.open {
+            open.hand_over_rows();
+            open.hand_over_pack();
+        }
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// Ends the log and waits until it is on disk.
     pub fn close(&mut self) {
-        if let Some(Open { rows, writer, .. }) = self.open.take() {
-            drop(rows);
-            let _ = writer.join();
+        if let Some(mut open) = self.open.take() {
+            open.hand_over_rows();
+            open.hand_over_pack();
+            if open.waits > 0 {
+                let text = "the process waited for the disk".to_string();
+                let note = NoteRow { t_ns: open.last_t_ns, source: self.stem.clone(), text, count: open.waits };
+                open.hand_over(Helping::Rows(vec![Row::Clock(ClockRecord::Note(note))]));
+            }
+            drop(open.to_disk);
+            let _ = open.writer.join();
         }
-    }
-
-    /// Why recording has stopped, told once.
-    pub fn take_failure(&self) -> Option<String> {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// A piece of a log of the mission with this digest; a piece of no file if there is none.
@@ -141,11 +225,16 @@ impl Drop for Logs {
     }
 }
 
-fn write_rows(mut recorder: Recorder<std::io::BufWriter<File>>, queue: &Receiver<Row>) -> Result<(), String> {
+fn write_rows(
+    mut recorder: Recorder<std::io::BufWriter<File>>,
+    queue: &Receiver<Helping>,
+    vehicles: &[Name],
+) -> Result<(), String> {
     let broken = |error: crate::recording::RecordingError| format!("recording has stopped: {error}");
     loop {
         match queue.recv_timeout(FLUSH_PERIOD) {
-            Ok(row) => recorder.write(&row).map_err(broken)?,
+            Ok(Helping::Rows(rows)) => rows.iter().try_for_each(|row| recorder.write(row)).map_err(broken)?,
+            Ok(Helping::Pack(pack)) => recorder.write_pack(&pack, vehicles).map_err(broken)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 recorder.finish().map_err(broken)?;

@@ -16,7 +16,7 @@ use zenoh::{Session, Wait};
 
 use crate::counts::Tally;
 use crate::error::{Error, Result};
-use crate::plane::{Frame, Plane, cost, frames};
+use crate::plane::{Frame, Plane, bundle, cost, frames};
 
 /// How much of the mission plane may be on its way.
 const WINDOW: u64 = 256 << 10;
@@ -87,8 +87,9 @@ impl Outbox {
         }
         match plane {
             Plane::State => {
-                self.state.put(bytes).wait().map_err(|_| Error::NotConnected)?;
-                self.tally.state_out.add_one();
+                let mut one = Vec::with_capacity(2 + bytes.len());
+                bundle(&mut one, bytes);
+                self.send_bundle(one, 1)?;
             }
             Plane::Mission => {
                 let mut queue = self.lock();
@@ -102,6 +103,13 @@ impl Outbox {
                 self.tally.mission_out.add_one();
             }
         }
+        Ok(())
+    }
+
+    /// Sends so many state-plane messages at once.
+    pub(crate) fn send_bundle(&self, bundle: Vec<u8>, messages: u64) -> Result<()> {
+        self.state.put(bundle).wait().map_err(|_| Error::NotConnected)?;
+        self.tally.state_out.add(messages);
         Ok(())
     }
 

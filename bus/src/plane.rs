@@ -2,7 +2,7 @@
 //!
 //! | plane | carries | when the other end is slow | largest message |
 //! |---|---|---|---|
-//! | state | one small coordination message per period | the message is dropped: a newer one follows | 8 KiB, as it is |
+//! | state | one small coordination message per period | the message is dropped: a newer one follows | 8 KiB, in bundles |
 //! | mission | missions, commands, the stepped clock, logs | the message waits in the line's backlog | 4 MiB, in frames of 32 KiB |
 //!
 //! A session of its own carries each line, so the keys name the participant only to be readable by outside tools.
@@ -169,6 +169,24 @@ pub(crate) fn frames(message: u32, bytes: &[u8]) -> impl Iterator<Item = Vec<u8>
     })
 }
 
+/// The most bytes of state-plane messages that travel together.
+pub(crate) const BUNDLE: usize = 32 << 10;
+
+/// Adds a state-plane message to a bundle: its length in two bytes, and itself.
+pub(crate) fn bundle(bundle: &mut Vec<u8>, message: &[u8]) {
+    // The plane's limit is below 64 KiB.
+    bundle.extend((message.len() as u16).to_le_bytes());
+    bundle.extend_from_slice(message);
+}
+
+/// The next message of a bundle and the rest; `None` if it is cut off or larger than the plane carries.
+pub(crate) fn unbundle(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (length, rest) = bytes.split_first_chunk()?;
+    let length = usize::from(u16::from_le_bytes(*length));
+    (length <= Plane::State.limit()).then_some(())?;
+    rest.split_at_checked(length)
+}
+
 /// What a frame costs in the transport's queue: itself and a generous header \[bytes\].
 pub(crate) fn cost(frame: &[u8]) -> u64 {
     frame.len() as u64 + 64
@@ -277,6 +295,26 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn bundles_hold_what_was_put_in_and_arbitrary_bytes_end_in_bounds(
+            messages in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..60), 0..20), noise: Vec<u8>
+        ) {
+            let mut bytes = Vec::new();
+            messages.iter().for_each(|message| bundle(&mut bytes, message));
+            let mut rest = &bytes[..];
+            for message in &messages {
+                let (next, after) = unbundle(rest).expect("whole");
+                prop_assert_eq!(next, &message[..]);
+                rest = after;
+            }
+            prop_assert!(rest.is_empty());
+            let mut rest = &noise[..];
+            while let Some((message, after)) = unbundle(rest) {
+                prop_assert!(message.len() + after.len() + 2 == rest.len());
+                rest = after;
+            }
+        }
+
         #[test]
         fn arbitrary_bytes_never_panic_and_never_assemble_more_than_the_limit(
             inputs in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..40), 0..40)

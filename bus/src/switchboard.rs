@@ -5,8 +5,8 @@
 
 use std::collections::HashMap;
 use std::fmt;
-use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -20,7 +20,8 @@ use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
-use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
+use crate::plane::{BUNDLE, Frame, Plane, Size, bundle, down_key, hub_token, join_key, participant_token, up_key};
+use crate::queue::{Events, Feed, queue};
 use crate::setup::{self, Endpoint, LEASE};
 
 /// How long [`Switchboard::close`] waits for participants to take what was sent to them.
@@ -37,14 +38,15 @@ pub struct SwitchboardConfig {
     pub endpoint: Endpoint,
     /// The most participants, dead ones included.
     pub max_lines: usize,
-    /// The most events that wait for the program; beyond, packets are dropped and counted.
+    /// The most packets of each plane that wait for the program; beyond, the oldest states and the newest others are
+    /// dropped and counted.
     pub queue: usize,
 }
 
 impl SwitchboardConfig {
-    /// 256 lines and 65 536 waiting events.
+    /// 512 lines and 65 536 waiting packets of each plane.
     pub fn new(endpoint: Endpoint) -> SwitchboardConfig {
-        SwitchboardConfig { endpoint, max_lines: 256, queue: 1 << 16 }
+        SwitchboardConfig { endpoint, max_lines: 512, queue: 1 << 16 }
     }
 }
 
@@ -111,6 +113,21 @@ pub struct Switchboard {
     lines: Arc<Lines>,
     tasks: Sender<Task>,
     clerk: Option<JoinHandle<()>>,
+    shortcut: Arc<OnceLock<Box<Shortcut>>>,
+    /// What is sent with the next [`flush`](Switchboard::flush), by line.
+    posted: Vec<Posted>,
+    /// The lines for which something is posted.
+    addressed: Vec<LineId>,
+}
+
+/// Who may take a state-plane packet at once, on the transport's thread; true if it was taken.
+pub type Shortcut = dyn Fn(LineId, Instant, &[u8]) -> bool + Send + Sync;
+
+/// State-plane messages for one line.
+#[derive(Clone, Debug, Default)]
+struct Posted {
+    bundle: Vec<u8>,
+    messages: u64,
 }
 
 /// The lines, as the sending threads see them.
@@ -146,11 +163,12 @@ impl Lines {
 
 impl Switchboard {
     /// Opens the lobby.
-    pub fn open(config: SwitchboardConfig) -> Result<(Switchboard, Receiver<HubEvent>)> {
+    pub fn open(config: SwitchboardConfig) -> Result<(Switchboard, Events<HubEvent>)> {
         let endpoint = config.endpoint.free()?;
         let lobby = setup::listen(&endpoint, setup::lobby_config(&endpoint)?)?;
-        let (events, receiver) = mpsc::sync_channel(config.queue.max(1));
-        let (tasks, queue) = mpsc::channel();
+        let (events, receiver) = queue(config.queue);
+        let (tasks, orders) = mpsc::channel();
+        let shortcut = Arc::<OnceLock<Box<Shortcut>>>::default();
         let lines = Arc::<Lines>::default();
 
         let knocks = Mutex::new(tasks.clone());
@@ -169,6 +187,7 @@ impl Switchboard {
             events,
             tasks: tasks.clone(),
             lines: Arc::clone(&lines),
+            shortcut: Arc::clone(&shortcut),
             by_id: HashMap::new(),
             sessions: HashMap::new(),
             admissions: 0,
@@ -177,12 +196,13 @@ impl Switchboard {
         let clerk = std::thread::Builder::new()
             .name("bus-clerk".into())
             .spawn(move || {
-                clerk.work(&queue);
+                clerk.work(&orders);
                 setup::close(lobby);
             })
             .map_err(Error::middleware)?;
         tracing::debug!("the lobby listens on {endpoint}");
-        Ok((Switchboard { endpoint, lines, tasks, clerk: Some(clerk) }, receiver))
+        let (posted, addressed) = (Vec::new(), Vec::new());
+        Ok((Switchboard { endpoint, lines, tasks, clerk: Some(clerk), shortcut, posted, addressed }, receiver))
     }
 
     /// Where the lobby listens.
@@ -200,6 +220,59 @@ impl Switchboard {
         inbox.outbox.send(plane, bytes)
     }
 
+    /// Puts a state-plane message with those that the next [`flush`](Switchboard::flush) sends to this participant.
+    ///
+    /// Messages that travel together cost the transport as much as one. A bundle that is full goes at once.
+    pub fn post(&mut self, line: LineId, message: &[u8]) {
+        if message.len() > Plane::State.limit() {
+            return;
+        }
+        if self.posted.len() <= line.index() {
+            self.posted.resize(line.index() + 1, Posted::default());
+        }
+        let posted = &mut self.posted[line.index()];
+        if posted.messages == 0 {
+            self.addressed.push(line);
+        }
+        bundle(&mut posted.bundle, message);
+        posted.messages += 1;
+        if posted.bundle.len() >= BUNDLE {
+            Switchboard::dispatch(&self.lines, line, posted);
+            self.addressed.retain(|other| *other != line);
+        }
+    }
+
+    /// Sends what was posted, without waiting for anybody; to how many participants.
+    ///
+    /// What a participant cannot be sent is dropped, as the state plane may.
+    pub fn flush(&mut self) -> usize {
+        for line in &self.addressed {
+            Switchboard::dispatch(&self.lines, *line, &mut self.posted[line.index()]);
+        }
+        let count = self.addressed.len();
+        self.addressed.clear();
+        count
+    }
+
+    /// Whether nothing waits to be sent.
+    pub fn is_flushed(&self) -> bool {
+        self.addressed.is_empty()
+    }
+
+    fn dispatch(lines: &Lines, line: LineId, posted: &mut Posted) {
+        let Posted { bundle, messages } = std::mem::take(posted);
+        if let Some(inbox) = lines.get(line).and_then(|line| line.inbox()).filter(|inbox| inbox.is_open()) {
+            // It fails only with the session, whose end is noticed elsewhere.
+            let _ = inbox.outbox.send_bundle(bundle, messages);
+        }
+    }
+
+    /// Lets state-plane packets be taken as they arrive, on the transport's threads and before they are queued. One that
+    /// is not taken is queued. It counts for lines that are opened from now on, and only the first shortcut does.
+    pub fn set_shortcut(&self, shortcut: Box<Shortcut>) {
+        let _ = self.shortcut.set(shortcut);
+    }
+
     /// The identity of a line's participant.
     pub fn id(&self, line: LineId) -> Option<String> {
         self.lines.get(line).map(|line| line.id.clone())
@@ -211,11 +284,9 @@ impl Switchboard {
     }
 
     /// Lets participants take what was sent to them (for a second at most), then closes every line and the lobby.
-    pub fn close(self) {
-        // Dropping does it.
-    }
-
-    fn shut(&mut self) {
+    /// Dropping does the same.
+    pub fn close(&mut self) {
+        self.flush();
         let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner).clone();
         let deadline = Instant::now() + FAREWELL;
         let open: Vec<_> = lines.iter().filter_map(|line| line.inbox()).filter(|inbox| inbox.is_open()).collect();
@@ -237,7 +308,7 @@ impl Switchboard {
 
 impl Drop for Switchboard {
     fn drop(&mut self) {
-        self.shut();
+        self.close();
     }
 }
 
@@ -261,7 +332,8 @@ enum Task {
 struct Clerk {
     endpoint: Endpoint,
     max_lines: usize,
-    events: SyncSender<HubEvent>,
+    events: Feed<HubEvent>,
+    shortcut: Arc<OnceLock<Box<Shortcut>>>,
     tasks: Sender<Task>,
     lines: Arc<Lines>,
     by_id: HashMap<String, LineId>,
@@ -303,8 +375,8 @@ impl LineSession {
 }
 
 impl Clerk {
-    fn work(&mut self, queue: &Receiver<Task>) {
-        while let Ok(task) = queue.recv() {
+    fn work(&mut self, orders: &Receiver<Task>) {
+        while let Ok(task) = orders.recv() {
             match task {
                 Task::Knock(query) => self.answer(&query),
                 Task::Gone { line, admission } => {
@@ -319,8 +391,8 @@ impl Clerk {
                         for line in lines {
                             let Some((session, was_open)) = self.unplug(line) else { continue };
                             if was_open {
-                                // The program may listen no more: it hears of the end if its queue has room.
-                                let _ = self.events.try_send(HubEvent::Left { line });
+                                // The program may listen no more.
+                                self.events.announce(HubEvent::Left { line });
                             }
                             scope.spawn(move || session.close());
                         }
@@ -395,7 +467,7 @@ impl Clerk {
     fn retire(&mut self, line: LineId) {
         let Some((session, was_open)) = self.unplug(line) else { return };
         if was_open {
-            let _ = self.events.send(HubEvent::Left { line });
+            self.events.announce(HubEvent::Left { line });
         }
         self.retired.retain(|(_, closer)| !closer.is_finished());
         let (rest, resting) = mpsc::channel();
@@ -433,6 +505,11 @@ impl Clerk {
         let inbox = Arc::new(Inbox::new(self.events.clone(), outbox, tally, move |plane, at, bytes| {
             HubEvent::Packet { line, plane, at, bytes }
         }));
+
+        if self.shortcut.get().is_some() {
+            let shortcut = Arc::clone(&self.shortcut);
+            inbox.set_shortcut(Box::new(move |at, bytes| shortcut.get().is_some_and(|take| take(line, at, bytes))));
+        }
 
         let up = Arc::clone(&inbox);
         session

@@ -68,6 +68,40 @@ pub struct MessageRow {
     pub fate: Fate,
 }
 
+/// What became of a message, without names: what the emulator hands on for every message of a fleet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settled {
+    /// When the fate was decided \[ns\].
+    pub t_ns: i64,
+    /// Index of the link among the mission's.
+    pub link: usize,
+    /// Number of the message on its link, from 0.
+    pub seq: u64,
+    /// When the emulator took it \[ns\].
+    pub sent_ns: i64,
+    /// When it was to arrive \[ns\].
+    pub due_ns: i64,
+    /// Its fate.
+    pub fate: Fate,
+    /// In real time, for a message that was delivered: how much later than due \[ns of wall clock\].
+    pub late_ns: Option<i64>,
+}
+
+impl Settled {
+    /// The row of `links.csv`, for a link between these two.
+    pub fn message(&self, from: &Name, to: &Name) -> MessageRow {
+        let Settled { t_ns, seq, sent_ns, due_ns, fate, .. } = *self;
+        MessageRow { t_ns, from: from.clone(), to: to.clone(), seq, sent_ns, due_ns, fate }
+    }
+
+    /// The row that compares the commanded delay with the achieved one, if the clock is a real one.
+    pub fn achieved(&self, from: &Name, to: &Name) -> Option<AchievedRow> {
+        let Settled { t_ns, seq, sent_ns, due_ns, .. } = *self;
+        let commanded_ns = due_ns - sent_ns;
+        self.late_ns.map(|late_ns| AchievedRow { t_ns, from: from.clone(), to: to.clone(), seq, commanded_ns, late_ns })
+    }
+}
+
 /// A directed link came up or went down.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[allow(missing_docs, reason = "the names are the columns of topology.csv")]
@@ -95,6 +129,7 @@ pub enum Record {
     Message(MessageRow),
     Topology(TopologyRow),
     Speed(SpeedRow),
+    Warning(NoteRow),
 }
 
 impl Record {
@@ -105,6 +140,7 @@ impl Record {
             Record::Message(row) => row.t_ns,
             Record::Topology(row) => row.t_ns,
             Record::Speed(row) => row.t_ns,
+            Record::Warning(row) => row.t_ns,
         }
     }
 }
@@ -135,7 +171,8 @@ pub struct TicksRow {
     pub worst_late_ns: i64,
 }
 
-/// A line for people: a warning, a rejoin, a refused message, with how often it happened.
+/// A line for people: a warning, a rejoin, a refused message, with how often it happened. What a vehicle warns of at
+/// the end of its flight follows from the mission ([`Record::Warning`]); all else is of the clock ([`ClockRecord::Note`]).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[allow(missing_docs, reason = "plain")]
 pub struct NoteRow {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use bus::setup::Endpoint;
@@ -11,9 +11,10 @@ use common::mission::Mission;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::Phase;
 
+use crate::console::Progress;
 use crate::results::{Summary, TheoryRow, diff, export_csv};
 use crate::run::{Failure, Plan, fly};
-use crate::{folder, operator, rehearse, theory};
+use crate::{folder, operator, rehearse, theory, worst};
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
 /// over an emulated network, and reports on it.
@@ -112,6 +113,12 @@ enum What {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+    /// Search the worst switching signal that brief connectivity losses admit, and save the mission with it
+    #[command(
+        after_help = "A signal is admitted if in every window of length t the vehicles are not connected for at most\n\
+        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3)."
+    )]
+    Worst(WorstArgs),
     /// Print the JSON schema of the mission file, for editors
     Schema,
     #[command(hide = true)]
@@ -142,6 +149,36 @@ struct RunArgs {
     /// Give up when the fleet is not complete after this long (s) (default: never with --attach, 60 s else)
     #[arg(long, value_name = "SECONDS")]
     patience: Option<f64>,
+    /// JSON for a pipe
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+struct WorstArgs {
+    /// The mission file; its own switching is left aside
+    mission: PathBuf,
+    /// Share of the time that may be lost in the long run, 0 to below 1
+    #[arg(long)]
+    alpha: f64,
+    /// Connectivity-loss bound T_0 (s)
+    #[arg(long, value_name = "SECONDS")]
+    t0: f64,
+    /// Least time between two changes (s)
+    #[arg(long, value_name = "SECONDS")]
+    dwell: f64,
+    /// What counts as hurt
+    #[arg(long, value_enum, default_value = "end")]
+    hurt: worst::Hurt,
+    /// How many flights the search may take
+    #[arg(long, default_value = "400")]
+    flights: usize,
+    /// Seed of the search
+    #[arg(long, default_value = "1")]
+    seed: u64,
+    /// Where the worst mission goes (default: worst-MISSION.toml)
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// JSON for a pipe
     #[arg(long)]
     json: bool,
@@ -194,6 +231,7 @@ fn run(what: What) -> Ended {
         What::Export { run, format: Format::Csv, out } => export(&run, out),
         What::Diff { a, b } => compare(&a, &b),
         What::Recover { recording, out } => recover(&recording, out),
+        What::Worst(args) => search(&args),
         What::Schema => {
             bus::tell!("{:#}", common::mission::schema());
             Ok(ExitCode::SUCCESS)
@@ -427,6 +465,57 @@ fn compare(a: &Path, b: &Path) -> Ended {
     } else {
         ExitCode::from(1)
     })
+}
+
+fn search(args: &WorstArgs) -> Ended {
+    let mission = load(&args.mission)?;
+    let seconds = |name: &str, value: f64, least: f64| match value.is_finite() && value >= least && value <= 1e6 {
+        true => Ok(()),
+        false => Err(End(2, format!("--{name}: found {value}; allowed: {least} to 1000000 s"))),
+    };
+    seconds("t0", args.t0, 0.0)?;
+    seconds("dwell", args.dwell, 1e-3)?;
+    let quest = worst::Quest {
+        allowance: worst::allowance(args.alpha, args.t0, args.dwell),
+        hurt: args.hurt,
+        flights: args.flights,
+        seed: args.seed,
+    };
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("worst-{}.toml", mission.name)));
+    let progress = Mutex::new(Progress::new(mission.end));
+    let tell = |flown: usize| {
+        progress.lock().unwrap_or_else(PoisonError::into_inner).counted("searching", flown, args.flights);
+    };
+    let found = worst::worst(&mission, &quest, &out, tell);
+    progress.lock().unwrap_or_else(PoisonError::into_inner).done();
+    let found = found.map_err(|reason| End(2, reason))?;
+    if args.json {
+        bus::tell!("{}", serde_json::to_string_pretty(&found).map_err(|error| End(4, error.to_string()))?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let when = match args.hurt {
+        worst::Hurt::End => "at the end",
+        worst::Hurt::Mean => "on average",
+    };
+    bus::tell!("{}: coordination error {when} ({} flights of {})", mission.name, found.flights, mission.end);
+    bus::tell!("  at the start          {:.4e}", found.initial);
+    bus::tell!("  as the mission is     {:.4e}", found.as_written);
+    bus::tell!("  worst signal found    {:.4e}, a decay at {:.5} 1/s", found.worst, found.rate);
+    match (found.bound, found.guaranteed_rate) {
+        (Some(bound), Some(rate)) => {
+            let times = if args.hurt == worst::Hurt::End {
+                format!(": {:.3} times the worst found", bound / found.worst)
+            } else {
+                String::new()
+            };
+            bus::tell!("  Theorem 4.4 allows    {bound:.4e} at the end, a decay at {rate:.5} 1/s{times}");
+        }
+        _ => {
+            bus::tell!("  no theorem bounds it: Theorem 4.4 needs (4.21), type II, and messages neither late nor lost")
+        }
+    }
+    bus::tell!("saved: {}", found.saved.display());
+    Ok(ExitCode::SUCCESS)
 }
 
 fn recover(path: &Path, out: Option<PathBuf>) -> Ended {

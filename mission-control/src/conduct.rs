@@ -49,7 +49,8 @@ pub enum ConductOutput {
         /// The piece.
         piece: LogPiece,
     },
-    /// Everything that could be collected is here; what could not is named, with the reason.
+    /// Everything that could be collected is here; what could not is named, with the reason. The fleet is dismissed when it
+    /// is on disk.
     Done {
         /// How the flight ended.
         phase: Phase,
@@ -252,7 +253,6 @@ impl Conduct {
         }
         self.step = Step::Ended;
         let missing = std::mem::take(&mut self.missing);
-        self.send(ToFleet::Dismiss);
         self.outputs.push_back(ConductOutput::Done { phase: self.ended, missing });
     }
 
@@ -375,8 +375,7 @@ mod tests {
         assert_eq!(said, vec![], "a vehicle still flies");
         let said = hears(&mut conduct, 9.2, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Finished)));
         assert_eq!(said[0], ConductOutput::Over(Phase::Finished));
-        assert_eq!(said[1], ConductOutput::Send(ToFleet::Dismiss));
-        assert!(matches!(said[2], ConductOutput::Done { phase: Phase::Finished, .. }));
+        assert!(matches!(said[1], ConductOutput::Done { phase: Phase::Finished, .. }));
         assert_eq!(conduct.poll_timeout(), None);
     }
 

@@ -48,6 +48,25 @@ impl Progress {
         }
     }
 
+    /// `done` of `all` pieces of work are done.
+    pub fn counted(&mut self, step: &str, done: usize, all: usize) {
+        match &self.bar {
+            Some(bar) => {
+                bar.set_length(all as u64);
+                bar.set_prefix(step.to_string());
+                bar.set_position(done as u64);
+                bar.set_message(format!("{done} / {all}"));
+            }
+            None => {
+                if self.last_step != step || self.last_line.elapsed() >= PLAIN_PERIOD {
+                    bus::remark!("{step}: {done} of {all}");
+                    self.last_line = Instant::now();
+                    self.last_step = step.to_string();
+                }
+            }
+        }
+    }
+
     /// A line that stays.
     pub fn line(&self, text: &str) {
         match &self.bar {

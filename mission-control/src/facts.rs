@@ -30,7 +30,9 @@ pub fn facts(mission: &Mission) -> Facts {
         }),
         guaranteed_rate: guarantee.map(|g| g.rate),
         guaranteed_factor: guarantee.and_then(|g| g.factor),
-        predicted_speed: Some(mission.nominal_factor() * mission.speed.at(mission.end).v_l),
+        predicted_speed: Some(
+            mission.excited_speed().unwrap_or(mission.nominal_factor() * mission.speed.at(mission.end).v_l),
+        ),
         predicted_along_bias_m: mission.predicted_along_bias(0),
         symbol: if is_chapter_4(mission) { "γ".to_string() } else { "ξ".to_string() },
         xi_unit: String::new(),
@@ -39,7 +41,14 @@ pub fn facts(mission: &Mission) -> Facts {
 }
 
 fn is_chapter_4(mission: &Mission) -> bool {
-    matches!(mission.law_choice, LawChoice::Switching(_) | LawChoice::Delayed(_) | LawChoice::DelayedWithLosses(_))
+    matches!(
+        mission.law_choice,
+        LawChoice::Switching(_)
+            | LawChoice::Delayed(_)
+            | LawChoice::DelayedWithLosses(_)
+            | LawChoice::Auxiliary(_)
+            | LawChoice::AuxiliarySwitching(_)
+    )
 }
 
 fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> VehicleFacts {
@@ -56,5 +65,5 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         PathChoice::Chain(_) => "lines and arcs",
         PathChoice::Helix(_) => "helix",
     });
-    VehicleFacts { id: plan.id.clone(), pattern_offset: plan.pattern, path: path.to_string(), planned }
+    VehicleFacts { id: plan.id.clone(), pattern: plan.pattern, path: path.to_string(), planned }
 }

@@ -14,3 +14,4 @@ pub mod results;
 pub mod run;
 pub mod simulate;
 pub mod theory;
+pub mod worst;

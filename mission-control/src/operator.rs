@@ -1,11 +1,10 @@
 //! Single commands to a fleet under way: `status`, `speed`, `stop`.
 
-use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use bus::Plane;
-use bus::clock::{Wake, recv_until};
 use bus::line::{Line, LineConfig, LineEvent};
+use bus::queue::{Events, Wake, recv_until};
 use bus::setup::Endpoint;
 use common::wire;
 use common::wire::fleet::{FleetStatus, FromFleet, ToFleet};
@@ -27,7 +26,7 @@ pub fn ask(endpoint: &Endpoint, question: &ToFleet, patience: Duration) -> Resul
     answer
 }
 
-fn exchange(line: &Line, events: &Receiver<LineEvent>, question: &ToFleet) -> Result<FromFleet, String> {
+fn exchange(line: &Line, events: &Events<LineEvent>, question: &ToFleet) -> Result<FromFleet, String> {
     let deadline = Instant::now() + ANSWER;
     loop {
         match recv_until(events, Some(deadline)) {

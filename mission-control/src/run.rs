@@ -12,13 +12,13 @@ use std::time::{Duration, Instant};
 
 use bus::Plane;
 use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, drive};
+use bus::drive::{Clock, Next, Port, Program, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
-use bus::recording::merge;
+use bus::recording::{Merged, merge};
 use bus::setup::Endpoint;
 use common::mission::Mission;
-use common::time::Span;
-use common::wire::fleet::{FleetStatus, FromFleet, Pace};
+use common::time::{Span, Time};
+use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
 use common::wire::vehicle::{LogPiece, Phase};
 use common::wire::{self, GarbageCount};
 use network_emulator::hub::{COLLECTOR, HUB};
@@ -103,10 +103,11 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     let folder = folder.map_or_else(make_folder, Ok)?;
     let patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
     let patience = patience.map(|p| Span::from_secs(p.as_secs_f64()));
-    let mut conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !own);
-    let mut port = ConductPort {
+    let conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !own);
+    let port = ConductPort {
         line,
         own,
+        mission: plan.mission.clone(),
         processes: &mut processes,
         progress: Progress::new(plan.mission.end),
         collected: folder.join(".collected"),
@@ -114,10 +115,19 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         interrupted: false,
         garbage: GarbageCount::default(),
     };
-    let exit = drive(&mut conduct, &mut port, &mut Clock::from_now(), &events);
+    let program = Shared::new(Program::new(conduct, port, Clock::from_now()));
+    let exit = drive(&program, &events);
+    let port = program.into_port();
     port.progress.done();
-    let collected = port.collected.clone();
-    port.line.close();
+    let ConductPort { line, collected, .. } = port;
+    // Own processes close their logs and end; the logs of others are theirs to keep until they are merged here.
+    let line = if own {
+        let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
+        line.close();
+        None
+    } else {
+        Some(line)
+    };
     let (phase, missing) = match exit {
         Ok(ending) => ending,
         Err(failure) => {
@@ -143,7 +153,14 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
     missing.extend(merged.incomplete.iter().map(|path| format!("{} ends in the middle", file_name(path))));
-    if !own {
+    missing.extend(merged.damaged.iter().map(|(path, chunks, cause)| {
+        format!("{chunks} damaged pieces of {} are left out; the first: {cause}", file_name(path))
+    }));
+    missing.extend(late_beginnings(&plan.mission, &merged));
+    if let Some(line) = line {
+        // What is on disk here need not be kept there.
+        let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
+        line.close();
         let _ = fs::remove_dir_all(&collected);
     }
     let how = match (plan.pace, own) {
@@ -154,6 +171,19 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     let host = HostFacts::now(how, begun.elapsed().as_secs_f64(), missing.clone());
     let summary = folder::finish(&folder, &host).map_err(Failure::Files)?;
     Ok(Flown { folder, phase, summary, missing })
+}
+
+/// Vehicles whose states begin in mid-flight, in words: an earlier life of theirs recorded elsewhere.
+fn late_beginnings(mission: &Mission, merged: &Merged) -> Vec<String> {
+    let late = |id: &str| merged.begins.get(id).copied().filter(|begin| *begin > 0);
+    let late = mission.vehicles.iter().filter_map(|vehicle| Some((&vehicle.id, late(&vehicle.id)?)));
+    late.map(|(id, begin)| {
+        let begin = Time::from_nanos(begin);
+        format!(
+            "the log of {id} begins at {begin}: it has none of what {id} recorded before, in another folder perhaps"
+        )
+    })
+    .collect()
 }
 
 fn file_name(path: &Path) -> String {
@@ -224,11 +254,12 @@ impl Processes {
         Command::new(std::env::current_exe().map_err(failed)?)
             .arg(program)
             .args(arguments)
-            .arg("--once")
+            .args(["--once", "--end-with-stdin"])
             .args([std::ffi::OsStr::new("--logs"), logs.as_os_str()])
             // A group of its own: what the terminal signals reaches mission-control, which ends the flight in order.
             .process_group(0)
-            .stdin(Stdio::null())
+            // Never written to: it is closed when this process is gone, however it went.
+            .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(said)
             .spawn()
@@ -289,6 +320,7 @@ impl Drop for Processes {
 struct ConductPort<'p> {
     line: Line,
     own: bool,
+    mission: Arc<Mission>,
     processes: &'p mut Processes,
     progress: Progress,
     collected: PathBuf,
@@ -318,7 +350,9 @@ impl ConductPort<'_> {
             Step::Flying => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{away}"),
             _ => away.trim_start_matches("; ").to_string(),
         };
-        self.progress.reached(name, status.now, &message);
+        // The time of a mission that the fleet flew before is none of this one's.
+        let now = if status.mission == self.mission.text { status.now } else { Time::ZERO };
+        self.progress.reached(name, now, &message);
     }
 
     fn keep(&self, who: &str, piece: &LogPiece) -> Result<(), String> {

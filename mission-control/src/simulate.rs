@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use common::machine::Machine;
 use common::mission::Mission;
-use common::record::Row;
+use common::record::{Name, Record, Row};
 use common::time::Time;
 use common::wire::fleet::{Pace, ToFleet};
 use common::wire::vehicle::{ClockPlan, Phase};
@@ -38,6 +38,7 @@ enum Event {
 
 struct Fleet<'m> {
     mission: &'m Arc<Mission>,
+    names: Vec<Name>,
     hub: Hub,
     nodes: Vec<VehicleNode>,
     conduct: Conduct,
@@ -71,6 +72,7 @@ pub fn simulate_with(
 ) -> Result<Outcome, String> {
     let mut fleet = Fleet {
         mission,
+        names: mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect(),
         hub,
         nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::new(&vehicle.id)).collect(),
         conduct: Conduct::new(mission.clone(), Pace::Stepped, None, false),
@@ -79,7 +81,7 @@ pub fn simulate_with(
         outcome: None,
     };
     for (index, vehicle) in mission.vehicles.iter().enumerate() {
-        fleet.events.push_back(Event::Hub(HubInput::Joined(vehicle.id.clone())));
+        fleet.events.push_back(Event::Hub(HubInput::Joined { id: vehicle.id.clone(), seat: index }));
         fleet.events.push_back(Event::Node(index, NodeInput::Connected));
     }
     fleet.events.push_back(Event::Conduct(ConductInput::Connected));
@@ -147,6 +149,11 @@ impl Fleet<'_> {
                     self.events.push_back(Event::Conduct(ConductInput::FromFleet(message)));
                 }
                 HubOutput::Record(row) => record(row),
+                HubOutput::Settled(settled) => {
+                    let link = &self.mission.links[settled.link];
+                    let row = settled.message(&self.names[link.from], &self.names[link.to]);
+                    record(Row::Exact(Record::Message(row)));
+                }
                 HubOutput::StartClock(_) => {
                     self.hub.handle(self.now, Some(HubInput::ClockStarted(ClockPlan::Stepped)));
                 }

@@ -11,7 +11,7 @@ use common::graph::switching::Switching;
 use common::machine::Machine;
 use common::mission::{Delay, Mission};
 use common::random::Stream;
-use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, Name, NoteRow, Record, Row, TopologyRow};
+use common::record::{ClockRecord, Fate, Name, NoteRow, Record, Row, Settled, TopologyRow};
 use common::time::{Span, Time};
 use common::wire::state::CoordinationState;
 use common::wire::{Garbage, GarbageCount};
@@ -24,7 +24,7 @@ pub struct Sent {
     /// Index of the vehicle whose line they came from.
     pub from: usize,
     /// The bytes.
-    pub bytes: Vec<u8>,
+    pub bytes: Arc<[u8]>,
 }
 
 /// What the channel wants done.
@@ -41,6 +41,8 @@ pub enum Channel {
     },
     /// Record this row.
     Record(Row),
+    /// Record what became of a message.
+    Settled(Settled),
 }
 
 /// The emulated network of one mission.
@@ -152,11 +154,6 @@ impl Emulator {
         self.links.iter().map(|link| &link.ledger)
     }
 
-    /// The name of a vehicle.
-    pub fn name(&self, vehicle: usize) -> &Name {
-        &self.names[vehicle]
-    }
-
     /// Sent, delivered, dropped, in flight, over all links.
     pub fn totals(&self) -> [u64; 4] {
         self.ledgers().fold([0; 4], |[s, d, x, f], l| [s + l.sent, d + l.delivered, x + l.dropped(), f + l.in_flight])
@@ -191,7 +188,7 @@ impl Emulator {
         if state.sender as usize != sent.from {
             return Err(Garbage::Forged);
         }
-        let bytes: Arc<[u8]> = sent.bytes.as_slice().into();
+        let bytes = Arc::clone(&sent.bytes);
         for slot in 0..self.out[sent.from].len() {
             let index = self.out[sent.from][slot];
             let link = &mut self.links[index];
@@ -237,17 +234,19 @@ impl Emulator {
     }
 
     fn record_message(&mut self, t: Time, message: &UnderWay, fate: Fate) {
-        let link = &self.links[message.link];
-        let row = MessageRow {
+        self.record_settled(t, message, fate, None);
+    }
+
+    fn record_settled(&mut self, t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i64>) {
+        self.outputs.push_back(Channel::Settled(Settled {
             t_ns: t.nanos(),
-            from: self.names[link.from].clone(),
-            to: self.names[link.to].clone(),
+            link: message.link,
             seq: message.number,
             sent_ns: message.sent.nanos(),
             due_ns: message.due.nanos(),
             fate,
-        };
-        self.outputs.push_back(Channel::Record(Row::Exact(Record::Message(row))));
+            late_ns,
+        }));
     }
 
     /// A message has come to the end of its delay: it is received if the link is up at that instant (p(t) gates
@@ -257,19 +256,10 @@ impl Emulator {
             self.settle(message.due, &message, Fate::LinkDown);
             return;
         }
-        self.settle(message.due, &message, Fate::Delivered);
+        self.links[message.link].ledger.settle(Fate::Delivered);
+        let late_ns = self.watch_delays.map(|speed_up| ((now - message.due).nanos() as f64 / speed_up) as i64);
+        self.record_settled(message.due, &message, Fate::Delivered, late_ns);
         let link = &self.links[message.link];
-        if let Some(speed_up) = self.watch_delays {
-            let row = AchievedRow {
-                t_ns: message.due.nanos(),
-                from: self.names[link.from].clone(),
-                to: self.names[link.to].clone(),
-                seq: message.number,
-                commanded_ns: (message.due - message.sent).nanos(),
-                late_ns: ((now - message.due).nanos() as f64 / speed_up) as i64,
-            };
-            self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Achieved(row))));
-        }
         self.outputs.push_back(Channel::Deliver { to: link.to, due: message.due, bytes: message.bytes });
     }
 
@@ -361,8 +351,10 @@ mod tests {
         Arc::new(Mission::parse("t.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
     }
 
-    fn state(mission: &Mission, sender: u16, seq: u32) -> Vec<u8> {
-        CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi: 1.0, scalar: None }.encode()
+    fn state(mission: &Mission, sender: u16, seq: u32) -> Arc<[u8]> {
+        CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi: 1.0, scalar: None }
+            .encode()
+            .into()
     }
 
     fn seconds(t: f64) -> Time {
@@ -377,7 +369,7 @@ mod tests {
     fn deliveries(outputs: &[Channel]) -> Vec<(usize, Time)> {
         let delivery = |output: &Channel| match output {
             Channel::Deliver { to, due, .. } => Some((*to, *due)),
-            Channel::Record(_) => None,
+            Channel::Record(_) | Channel::Settled(_) => None,
         };
         outputs.iter().filter_map(delivery).collect()
     }
@@ -522,7 +514,7 @@ mod tests {
             let in_flight: u64 = emulator.ledgers().map(|ledger| ledger.in_flight).sum();
             let told = drain(&mut emulator)
                 .iter()
-                .filter(|o| matches!(o, Channel::Record(Row::Exact(Record::Message(row))) if row.fate == Fate::InFlight))
+                .filter(|o| matches!(o, Channel::Settled(settled) if settled.fate == Fate::InFlight))
                 .count() as u64;
             prop_assert_eq!(in_flight, told);
         }

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use bus::Plane;
-use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, Rest, drive};
+use bus::console::{Parent, StopFlag};
+use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::logs::Logs;
+use bus::queue::{Bell, Events};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use clap::Parser;
@@ -25,6 +26,14 @@ const START_LEAD: Duration = Duration::from_millis(500);
 
 /// How long a port that is in use is waited for.
 const PORT_PATIENCE: Duration = Duration::from_secs(2);
+
+/// So many sendings within [`BURST`] go at once, each by itself. What more there is waits for [`GATHERING`], and travels in
+/// bundles.
+const SINGLE_SENDINGS: usize = 16;
+/// See [`SINGLE_SENDINGS`].
+const BURST: Duration = Duration::from_millis(1);
+/// How long messages of a burst wait for others that go the same way.
+const GATHERING: Duration = Duration::from_micros(200);
 
 /// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
 ///
@@ -44,6 +53,9 @@ pub struct Args {
     /// End when mission-control has collected the logs of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
+    /// End when standard input is closed, but not before a flight under way is over: what started this process is gone
+    #[arg(long, hide = true)]
+    pub end_with_stdin: bool,
 }
 
 /// Runs the program to its end.
@@ -59,25 +71,61 @@ pub fn run(args: Args) -> ExitCode {
     stop.arm();
     bus::tell!("{}", switchboard.endpoint());
     tracing::info!("network-emulator listens on {}", switchboard.endpoint());
-    let mut port = HubPort {
+    let port = HubPort {
         switchboard,
         logs: Logs::new(&args.logs, HUB),
         lines: HashMap::new(),
         ids: BTreeMap::new(),
+        seats: Vec::new(),
+        burst: Burst::default(),
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
+        parent: args.end_with_stdin.then(Parent::at_stdin),
         rest: Rest::default(),
         recording_failed: None,
     };
-    let exit = drive(&mut Hub::new(), &mut port, &mut Clock::Stopped, &events);
-    port.logs.close();
-    port.switchboard.close();
+    let program = Arc::new(Shared::new(Program::new(Hub::new(), port, Clock::Stopped)));
+    take_shortcut(&program, events.bell());
+    let exit = drive(&program, &events);
+    // Of the transport's threads, one may hold the program for a moment more.
+    let mut program = program.hold();
+    program.port.logs.close();
+    program.port.switchboard.close();
     exit
 }
 
+/// Lets the transport's threads decide about states as they arrive: waking the loop for each would cost more than all the
+/// rest. What comes while the program is busy, or behind others that wait, is left to the loop.
+fn take_shortcut(program: &Arc<Shared<HubPort>>, bell: Bell<HubEvent>) {
+    let weak: Weak<Shared<HubPort>> = Arc::downgrade(program);
+    let take = move |line: LineId, at: Instant, bytes: &[u8]| {
+        let Some(program) = weak.upgrade() else { return false };
+        let Some(mut program) = program.try_hold() else { return false };
+        // Under the lock: the loop takes from the queue under it, too.
+        if bell.is_crowded() || program.port.seats.get(line.index()) != Some(&Some(line)) {
+            return false;
+        }
+        let awaited = program.at_once(at, HubInput::State(line.index(), bytes.into()));
+        if program.port.send_at_once(at) || awaited {
+            bell.ring();
+        }
+        true
+    };
+    program.hold().port.switchboard.set_shortcut(Box::new(take));
+}
+
+/// How much was sent of late.
+#[derive(Clone, Copy, Debug, Default)]
+struct Burst {
+    begun: Option<Instant>,
+    sendings: usize,
+    /// When what was gathered is sent; the loop knows of it.
+    send_at: Option<Instant>,
+}
+
 /// Opens the switchboard. A port in use may belong to a process that was killed a moment ago.
-fn open(listen: &Endpoint) -> bus::Result<(Switchboard, Receiver<HubEvent>)> {
+fn open(listen: &Endpoint) -> bus::Result<(Switchboard, Events<HubEvent>)> {
     let patience = Rest::default();
     loop {
         match Switchboard::open(SwitchboardConfig::new(listen.clone())) {
@@ -92,10 +140,15 @@ struct HubPort {
     logs: Logs,
     lines: HashMap<Name, LineId>,
     ids: BTreeMap<LineId, Name>,
+    /// The lines of vehicles, by number.
+    seats: Vec<Option<LineId>>,
+    burst: Burst,
     /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
     once: bool,
+    /// Who started this process for itself.
+    parent: Option<Parent>,
     rest: Rest,
     /// Why recording failed; the flight is stopped at the next opportunity.
     recording_failed: Option<String>,
@@ -106,12 +159,33 @@ fn is_control(id: &str) -> bool {
 }
 
 impl HubPort {
-    fn send(&self, id: &str, plane: Plane, bytes: &[u8]) {
+    fn send(&self, id: &str, bytes: &[u8]) {
         if let Some(line) = self.lines.get(id)
-            && let Err(error) = self.switchboard.send(*line, plane, bytes)
+            && let Err(error) = self.switchboard.send(*line, Plane::Mission, bytes)
         {
             tracing::debug!("not sent to {id}: {error}");
         }
+    }
+
+    /// Sends what the machine has just delivered, or leaves it to the loop if there is much of it; true if the loop must be
+    /// told.
+    fn send_at_once(&mut self, at: Instant) -> bool {
+        if self.burst.send_at.is_some() {
+            return false;
+        }
+        let burst = &mut self.burst;
+        if burst.begun.is_none_or(|begun| at.saturating_duration_since(begun) > BURST) {
+            (burst.begun, burst.sendings) = (Some(at), 0);
+        }
+        if burst.sendings < SINGLE_SENDINGS {
+            burst.sendings += self.switchboard.flush();
+            return false;
+        }
+        if self.switchboard.is_flushed() {
+            return false;
+        }
+        burst.send_at = Some(at + GATHERING);
+        true
     }
 
     fn ignore(&mut self, line: LineId, kind: Garbage) {
@@ -141,7 +215,10 @@ impl Port for HubPort {
                     return None;
                 }
                 tracing::info!("{id} joined");
-                Some((None, HubInput::Joined(id)))
+                let seat = line.index();
+                self.seats.resize(self.seats.len().max(seat + 1), None);
+                self.seats[seat] = Some(line);
+                Some((None, HubInput::Joined { id, seat }))
             }
             HubEvent::Left { line } => {
                 let id = self.ids.get(&line)?.clone();
@@ -152,8 +229,8 @@ impl Port for HubPort {
                 Some((None, HubInput::Left(id.to_string())))
             }
             HubEvent::Packet { line, plane: Plane::State, at, bytes } => {
-                let id = self.ids.get(&line)?.clone();
-                (!is_control(&id)).then_some((Some(at), HubInput::State(id, bytes)))
+                let seat = self.seats.get(line.index())?.is_some().then_some(line.index())?;
+                Some((Some(at), HubInput::State(seat, bytes.into())))
             }
             HubEvent::Packet { line, plane: Plane::Mission, bytes, .. } => {
                 let id = self.ids.get(&line)?.clone();
@@ -176,10 +253,15 @@ impl Port for HubPort {
 
     fn perform(&mut self, output: HubOutput, clock: &mut Clock) -> Next<Self> {
         match output {
-            HubOutput::ToVehicle(id, message) => self.send(&id, Plane::Mission, &wire::encode(&message)),
-            HubOutput::Deliver(id, bytes) => self.send(&id, Plane::State, &bytes),
-            HubOutput::ToControl { who, message } => self.send(&who, Plane::Mission, &wire::encode(&message)),
+            HubOutput::ToVehicle(id, message) => self.send(&id, &wire::encode(&message)),
+            HubOutput::Deliver(seat, bytes) => {
+                if let Some(Some(line)) = self.seats.get(seat) {
+                    self.switchboard.post(*line, &bytes);
+                }
+            }
+            HubOutput::ToControl { who, message } => self.send(&who, &wire::encode(&message)),
             HubOutput::Record(row) => self.logs.write(row),
+            HubOutput::Settled(settled) => self.logs.settled(&settled),
             HubOutput::CloseLog => self.logs.close(),
             HubOutput::Say(text) => tracing::info!("{text}"),
             HubOutput::OpenLog { mission, fresh } => {
@@ -210,13 +292,31 @@ impl Port for HubPort {
         Next::Go
     }
 
+    fn flush(&mut self, now: Instant) -> Option<Instant> {
+        match self.burst.send_at {
+            Some(at) if at > now => {}
+            Some(_) => {
+                self.burst.send_at = None;
+                self.burst.sendings += self.switchboard.flush();
+            }
+            None => {
+                self.send_at_once(now);
+            }
+        }
+        self.burst.send_at
+    }
+
     fn tend(&mut self, hub: &Hub) -> Next<Self> {
-        if let Some(failure) = self.logs.take_failure() {
+        if let Some(failure) = self.logs.tend() {
             tracing::error!("{failure}; the network goes on without it");
             self.recording_failed = Some(failure);
         }
         if self.once && self.rest.is_over(hub.phase() == Phase::Running) {
             tracing::warn!("nothing to fly for ten minutes; ended");
+            return Next::Exit(self.exit_code());
+        }
+        if self.parent.as_ref().is_some_and(Parent::is_gone) && hub.phase() != Phase::Running {
+            tracing::info!("mission-control is gone; ended");
             return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {

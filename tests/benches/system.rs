@@ -1,7 +1,7 @@
 //! The system as a whole, measured. Build the programs first:
 //!
 //! ```text
-//! cargo build --release && cargo bench -p cpf-tests --bench system -- [simulate] [stepped] [hop] [throughput] [delay] [fleet]
+//! cargo build --release && cargo bench -p cpf-tests --bench system -- [machines] [simulate] [stepped] [hop] [throughput] [delay] [fleet]
 //! ```
 //!
 //! Without a name, all are run, in two minutes or so. Rows are for docs/benchmarks.md. Medians count; on a shared machine the tails say more about
@@ -11,11 +11,12 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
 use bus::Plane;
 use bus::line::{Line, LineConfig, LineEvent};
+use bus::queue::Events;
 use bus::setup::Endpoint;
 use common::mission::Mission;
 use common::record::ClockRecord;
@@ -34,7 +35,8 @@ fn main() {
     let wanted = |name: &str| names.is_empty() || names.iter().any(|n| n == name);
     println!("| what | figure |\n|---|---|");
     for (name, bench) in [
-        ("simulate", simulate as fn()),
+        ("machines", machines as fn()),
+        ("simulate", simulate),
         ("stepped", stepped),
         ("hop", hop),
         ("throughput", throughput),
@@ -74,31 +76,35 @@ fn cpu_seconds() -> f64 {
 
 // --- one thread --------------------------------------------------------------------------------------------------------
 
-/// Vehicle-seconds per processor-second of `simulate`, of the machines alone and with the recording written.
-fn simulate() {
+/// Vehicle-seconds per processor-second of some way to fly the flagship.
+fn per_cpu_second(work: impl Fn(&Arc<Mission>)) -> f64 {
     let mission = mission(&mission_text("missions/auv-helix.toml"));
     let flown = mission.end.secs() * mission.vehicles.len() as f64;
-    let per_cpu = |work: &dyn Fn()| {
-        let of = |runs: u32| {
-            let begun = cpu_seconds();
-            (0..runs).for_each(|_| work());
-            flown * f64::from(runs) / (cpu_seconds() - begun)
-        };
-        median((0..5).map(|_| of(20)).collect())
+    let of = |runs: u32| {
+        let begun = cpu_seconds();
+        (0..runs).for_each(|_| work(&mission));
+        flown * f64::from(runs) / (cpu_seconds() - begun)
     };
-    let machines = per_cpu(&|| {
-        let outcome = mission_control::simulate::simulate(&mission, |_| {}, |_| true).expect("flies");
+    median((0..5).map(|_| of(20)).collect())
+}
+
+/// `simulate`, of the machines alone.
+fn machines() {
+    let machines = per_cpu_second(|mission| {
+        let outcome = mission_control::simulate::simulate(mission, |_| {}, |_| true).expect("flies");
         assert_eq!(outcome.phase, Phase::Finished);
     });
-    row(
-        "`simulate` auv-helix, machines and rows, nothing written",
-        &format!("{machines:.0} vehicle-seconds per CPU-second"),
-    );
+    let figure = format!("{machines:.0} vehicle-seconds per CPU-second");
+    row("`simulate` auv-helix, machines and rows, nothing written", &figure);
+}
+
+/// `simulate` with the recording written.
+fn simulate() {
     let ground = Ground::new();
     let file = AtomicU64::new(0);
-    let recorded = per_cpu(&|| {
+    let recorded = per_cpu_second(|mission| {
         let path = ground.path(&format!("r{}.mcap", file.fetch_add(1, Ordering::Relaxed)));
-        mission_control::rehearse::record(&mission, &path, |_| {}).expect("flies");
+        mission_control::rehearse::record(mission, &path, |_| {}).expect("flies");
         std::fs::remove_file(path).expect("was written");
     });
     row("the same with the recording written", &format!("{recorded:.0} vehicle-seconds per CPU-second"));
@@ -297,7 +303,7 @@ impl Emulated {
                 }
             }
         });
-        std::thread::spawn(move || from_0.into_iter().for_each(drop));
+        std::thread::spawn(move || from_0.for_each(drop));
         Emulated {
             _ground: ground,
             mission,
@@ -331,7 +337,7 @@ fn say(line: &Line, message: &FromVehicle) {
     line.send(Plane::Mission, &common::wire::encode(message)).expect("sent");
 }
 
-fn wait_for<M: bincode::Decode<()>>(events: &Receiver<LineEvent>, mut is_it: impl FnMut(M) -> bool) {
+fn wait_for<M: bincode::Decode<()>>(events: &Events<LineEvent>, mut is_it: impl FnMut(M) -> bool) {
     loop {
         let event = events.recv_timeout(Duration::from_secs(10)).expect("an answer");
         if let LineEvent::Packet { plane: Plane::Mission, bytes, .. } = event

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bus::recording::canonical_order_of_records;
 use common::machine::Machine;
 use common::mission::Mission;
-use common::record::{Record, Row};
+use common::record::{Name, Record, Row};
 use common::time::Time;
 use cpf_tests::{mission, mission_text, with};
 use mission_control::simulate::simulate;
@@ -30,7 +30,7 @@ fn one_period_at_a_time(mission: &Arc<Mission>) -> Vec<Record> {
         while let Some(at) = emulator.poll_timeout().filter(|at| *at < t) {
             emulator.handle(at, None);
         }
-        drain(&mut emulator, &mut inboxes, &mut records);
+        drain(mission, &mut emulator, &mut inboxes, &mut records);
         let mut said = Vec::new();
         for (from, flight) in flights.iter_mut().enumerate() {
             for (due, bytes) in inboxes.remove(&from).unwrap_or_default() {
@@ -39,7 +39,7 @@ fn one_period_at_a_time(mission: &Arc<Mission>) -> Vec<Record> {
             flight.handle(t, None);
             while let Some(output) = flight.poll_output() {
                 match output {
-                    FlightOutput::Transmit(bytes) => said.push(Sent { from, bytes }),
+                    FlightOutput::Transmit(bytes) => said.push(Sent { from, bytes: bytes.into() }),
                     FlightOutput::Record(Row::Exact(record)) => records.push(record),
                     _ => {}
                 }
@@ -54,16 +54,26 @@ fn one_period_at_a_time(mission: &Arc<Mission>) -> Vec<Record> {
         emulator.handle(at, None);
     }
     emulator.finish(mission.end);
-    drain(&mut emulator, &mut inboxes, &mut records);
+    drain(mission, &mut emulator, &mut inboxes, &mut records);
     in_order(records)
 }
 
-fn drain(emulator: &mut Emulator, inboxes: &mut BTreeMap<usize, Vec<(Time, Vec<u8>)>>, records: &mut Vec<Record>) {
+fn drain(
+    mission: &Mission,
+    emulator: &mut Emulator,
+    inboxes: &mut BTreeMap<usize, Vec<(Time, Vec<u8>)>>,
+    records: &mut Vec<Record>,
+) {
+    let name = |vehicle: usize| Name::from(mission.vehicles[vehicle].id.as_str());
     while let Some(output) = emulator.poll_output() {
         match output {
             Channel::Deliver { to, due, bytes } => inboxes.entry(to).or_default().push((due, bytes.to_vec())),
             Channel::Record(Row::Exact(record)) => records.push(record),
             Channel::Record(_) => {}
+            Channel::Settled(settled) => {
+                let link = &mission.links[settled.link];
+                records.push(Record::Message(settled.message(&name(link.from), &name(link.to))));
+            }
         }
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use bus::recording::Recording;
 use common::mission::Mission;
 use common::record::Row;
+use common::time::Time;
 use cpf_tests::{assert_close, mission, mission_text, state_at, with};
 use mission_control::facts::facts;
 use mission_control::results::{Summary, VehicleSummary, summarise};
@@ -49,7 +50,7 @@ impl Flown {
     fn apart(&self, t_s: f64) -> f64 {
         let xi = |index: usize| {
             let plan = &self.mission.vehicles[index];
-            state_at(&self.recording.exact, &plan.id, t_s).xi - plan.pattern
+            state_at(&self.recording.exact, &plan.id, t_s).xi - plan.pattern.at(Time::from_secs(t_s)).h
         };
         xi(0) - xi(1)
     }

@@ -81,7 +81,8 @@ impl Hostile {
     }
 
     fn says(&self, bytes: Vec<u8>) {
-        put(&self.session, "cpf/c/up/state", bytes);
+        // A bundle of one.
+        put(&self.session, "cpf/c/up/state", [&(bytes.len() as u16).to_le_bytes()[..], &bytes].concat());
     }
 }
 

@@ -41,7 +41,7 @@ fn after(order: &[(&str, usize)]) -> Vec<(bool, Phase, String)> {
     for (what, vehicle) in order {
         let id = IDS[*vehicle].to_string();
         if *what == "joins" {
-            inputs.push_back(HubInput::Joined(id));
+            inputs.push_back(HubInput::Joined { id, seat: *vehicle });
         } else {
             nodes[*vehicle].handle(now, Some(NodeInput::Connected));
             inputs.extend(said(&mut nodes[*vehicle], &id));

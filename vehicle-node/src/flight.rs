@@ -9,6 +9,7 @@ use common::machine::Machine;
 use common::mission::{Mission, SpeedProfile, Start};
 use common::record::{ClockRecord, Name, NoteRow, Record, Row, StateRow, TicksRow};
 use common::time::Time;
+use common::vehicle::environment::Environment;
 use common::wire::Garbage;
 use common::wire::state::CoordinationState;
 use common::wire::vehicle::SpeedCommand;
@@ -46,6 +47,8 @@ pub struct Flight {
     me: usize,
     name: Name,
     craft: Box<dyn Craft>,
+    /// What disturbs the vehicle, if anything does.
+    environment: Option<Environment>,
     law: Box<dyn VehicleLaw>,
     neighbours: Neighbours,
     speed: SpeedProfile,
@@ -110,6 +113,7 @@ impl Flight {
         Ok(Flight {
             name: mission.vehicles[me].id.as_str().into(),
             craft: mission.craft(me, start)?,
+            environment: mission.environment(me),
             law: mission.law.vehicle(me),
             neighbours: Neighbours::new(&mission, me),
             speed: mission.speed.clone(),
@@ -174,7 +178,11 @@ impl Flight {
         self.watch_deadline(now, due);
         let tick = due;
         if let Some(last) = self.last {
-            for _ in last..tick {
+            for begun in last..tick {
+                // The period that was run last is exposed already, one that was missed is not.
+                if begun > last {
+                    self.expose(begun);
+                }
                 let period = self.mission.control_period.secs();
                 self.craft.advance(period, self.mission.substeps);
                 self.law.advance(period);
@@ -193,19 +201,30 @@ impl Flight {
         }
     }
 
-    /// One control period: neighbours, coordination, path following, message, record.
+    /// Exposes the vehicle to what disturbs it in a control period.
+    fn expose(&mut self, tick: i64) {
+        let now = self.instant(tick);
+        if let Some(environment) = &mut self.environment {
+            self.craft.expose(&environment.conditions(now, tick as u64));
+        }
+    }
+
+    /// One control period: disturbances, neighbours, coordination, path following, message, record.
     fn control(&mut self, t: Time, tick: i64) {
+        self.expose(tick);
         let reference = self.speed.at(t);
-        let plan = &self.mission.vehicles[self.me];
+        let pattern = self.mission.vehicles[self.me].pattern.at(t);
+        let law = &self.law;
         if self.rejoining
-            && let Some(xi) = self.neighbours.formation_xi(t, reference.v_l)
+            && let Some(xi) = self.neighbours.formation_xi(t, |scalar| law.neighbour_rate(reference, scalar))
         {
-            self.craft.place_target(xi + plan.pattern);
+            self.craft.place_target(xi + pattern.h);
             self.rejoining = false;
         }
         let mut own = self.craft.own(reference);
-        own.xi -= plan.pattern;
-        let present = self.neighbours.present(t, reference.v_l);
+        own.xi -= pattern.h;
+        (own.h_dot, own.h_ddot) = (pattern.h_dot, pattern.h_ddot);
+        let present = self.neighbours.present(t, |scalar| law.neighbour_rate(reference, scalar));
         let demand = self.law.demand(reference, &own, present);
         let heard = present.len() as u16;
         self.craft.command(reference, demand);
@@ -298,20 +317,22 @@ impl Flight {
         self.outputs.push_back(FlightOutput::Record(Row::Clock(ClockRecord::Note(row))));
     }
 
+    /// What the vehicle warns of follows from the mission, as its states do.
+    fn warn(&mut self, now: Time) {
+        let source = &self.mission.vehicles[self.me].id;
+        for warning in self.craft.warnings().iter().filter(|warning| warning.count > 0) {
+            let (source, text) = (source.clone(), warning.what.to_string());
+            let row = NoteRow { t_ns: now.nanos(), source, text, count: warning.count };
+            self.outputs.push_back(FlightOutput::Record(Row::Exact(Record::Warning(row))));
+        }
+    }
+
     fn finish(&mut self, now: Time) {
         self.over = true;
+        self.warn(now);
         if self.deadlines.is_some() {
             self.report_deadlines(now);
-            for kind in [
-                Garbage::Foreign,
-                Garbage::Oversized,
-                Garbage::Malformed,
-                Garbage::NotFinite,
-                Garbage::WrongMission,
-                Garbage::Forged,
-                Garbage::FromTheFuture,
-                Garbage::Stale,
-            ] {
+            for kind in Garbage::ALL {
                 let count = self.neighbours.garbage.of(kind);
                 if count > 0 {
                     self.note(now, format!("ignored messages: {}", kind.as_str()), count);
@@ -323,6 +344,7 @@ impl Flight {
 
     fn fail(&mut self, now: Time, reason: &str) {
         self.over = true;
+        self.warn(now);
         let text = format!("{} at {now}: {reason}", self.mission.vehicles[self.me].id);
         self.note(now, text.clone(), 1);
         self.outputs.push_back(FlightOutput::Failed(text));
@@ -362,6 +384,7 @@ impl Machine for Flight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use common::wire::state::seal;
 
     const HELIX: &str = include_str!("../../missions/auv-helix.toml");
 
@@ -425,6 +448,60 @@ mod tests {
         let rate = whole.craft.observe().xi_rate;
         let moved = frozen.craft.observe().xi - whole.craft.observe().xi;
         assert!((moved - 4.0 * 0.05 * rate).abs() < 1e-9, "{moved}");
+    }
+
+    fn mission_with(keys: &str) -> Arc<Mission> {
+        let text = HELIX.replacen("[fleet]\n", &format!("[fleet]\n{keys}\n"), 1);
+        Arc::new(Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
+    }
+
+    #[test]
+    fn missed_periods_have_their_own_conditions() {
+        // The speed is stuck during missed periods only, and the vehicle is carried by the water all the time.
+        let keys = "failure = { speed_stuck = { speed_mps = 0.4, from_s = 0.1, to_s = 0.2 } }\n\
+                    current = { velocity_mps = [0.0, 0.0, 1.0] }";
+        let mut flight = Flight::new(mission_with(keys), 0, Some(1.0)).expect("flies");
+        flight.handle(Time::ZERO, None);
+        flight.handle(Time::from_secs(0.25), None);
+        let seen = flight.craft.observe();
+        assert!((seen.position[2] - (-5.0 + 0.25)).abs() < 0.01, "{seen:?}");
+        assert!((seen.speed - 0.4).abs() < 0.1, "{seen:?}");
+    }
+
+    #[test]
+    fn the_laws_see_noise_and_the_record_does_not() {
+        let rows = |keys: &str| {
+            let mut flight = Flight::new(mission_with(keys), 0, None).expect("flies");
+            let mut rows = Vec::new();
+            flight.run_until(Time::from_secs(0.5), [], |_, output| match output {
+                FlightOutput::Record(Row::Exact(Record::State(row))) => rows.push(row),
+                _ => {}
+            });
+            rows
+        };
+        let (quiet, noisy) = (rows(""), rows("noise = { position_m = 0.5, turn_rate_degps = 1.0 }"));
+        assert_eq!((quiet[0].x_m, quiet[0].e_norm_m), (noisy[0].x_m, noisy[0].e_norm_m));
+        assert_ne!(quiet[1].x_m, noisy[1].x_m);
+        assert_eq!(noisy, rows("noise = { position_m = 0.5, turn_rate_degps = 1.0 }"), "seeded");
+    }
+
+    #[test]
+    fn what_a_vehicle_warns_of_is_an_exact_row_at_the_end() {
+        let text = HELIX.replacen("duration_s = 800.0", "duration_s = 2.0", 1).replacen(
+            "[fleet]\n",
+            "[fleet]\nlimits = { force_n = 1.0 }\n",
+            1,
+        );
+        let mission = Arc::new(Mission::parse("m.toml", &text).expect("sound"));
+        let mut flight = Flight::new(mission, 0, None).expect("flies");
+        let mut warnings = Vec::new();
+        flight.run_until(Time::from_secs(5.0), [], |at, output| match output {
+            FlightOutput::Record(Row::Exact(Record::Warning(row))) => warnings.push((at, row)),
+            _ => {}
+        });
+        let [(at, row)] = &warnings[..] else { panic!("one warning, not {warnings:?}") };
+        assert_eq!((at.secs(), row.t_ns, &*row.source), (2.0, 2_000_000_000, "auv1"));
+        assert!(row.text.contains("at its limit") && row.count > 30, "{row:?}");
     }
 
     #[test]
@@ -498,6 +575,7 @@ mod tests {
             .run(&(bytes, any::<bool>()), |(mut bytes, framed)| {
                 if framed {
                     bytes.splice(0..0, *b"CX\x01\x00");
+                    seal(&mut bytes);
                 }
                 let mut flight = Flight::new(mission.clone(), 0, None).expect("flies");
                 flight.handle(Time::ZERO, Some(FlightInput::Heard(bytes)));

@@ -93,8 +93,9 @@ impl Neighbours {
         Ok(())
     }
 
-    /// N_i at this instant, with what stands for each neighbour's state.
-    pub fn present(&mut self, now: Time, v_l: f64) -> &[Neighbour] {
+    /// N_i at this instant, with what stands for each neighbour's state. `rate` is that at which a neighbour is taken to
+    /// have moved on, by the scalar that it sent: v_L, if the vehicle is told.
+    pub fn present(&mut self, now: Time, rate: impl Fn(f64) -> f64) -> &[Neighbour] {
         self.present.clear();
         for (vehicle, heard) in self.heard.iter().enumerate() {
             let Some(heard) = heard else { continue };
@@ -102,22 +103,24 @@ impl Neighbours {
                 continue;
             }
             let age = (now - heard.state.made).secs();
+            let scalar = heard.state.scalar.unwrap_or(0.0);
             let xi = match self.between {
                 Between::Hold => heard.state.xi,
-                Between::Advance => heard.state.xi + v_l * age,
-                Between::Align => heard.state.xi + self.nominal_factor * v_l * (age - self.law_delay),
+                Between::Advance => heard.state.xi + rate(scalar) * age,
+                Between::Align => heard.state.xi + self.nominal_factor * rate(scalar) * (age - self.law_delay),
             };
-            let scalar = heard.state.scalar.unwrap_or(0.0);
             self.present.push(Neighbour { vehicle, xi, scalar, said: heard.state.xi, age });
         }
         &self.present
     }
 
-    /// The neighbours' mean coordination state advanced to now at the speed the fleet travels at, if any was heard.
-    pub fn formation_xi(&self, now: Time, v_l: f64) -> Option<f64> {
+    /// The neighbours' mean coordination state advanced to now at the speed the fleet travels at, if any was heard; `rate`
+    /// as for [`Neighbours::present`].
+    pub fn formation_xi(&self, now: Time, rate: impl Fn(f64) -> f64) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for heard in self.heard.iter().flatten() {
-            sum += heard.state.xi + self.nominal_factor * v_l * (now - heard.state.made).secs();
+            let rate = self.nominal_factor * rate(heard.state.scalar.unwrap_or(0.0));
+            sum += heard.state.xi + rate * (now - heard.state.made).secs();
             count += 1;
         }
         (count > 0).then(|| sum / f64::from(count))
@@ -141,12 +144,16 @@ mod tests {
         CoordinationState { mission: mission.digest, sender, seq, made, xi, scalar: None }.encode()
     }
 
+    fn v_l(_: f64) -> f64 {
+        0.5
+    }
+
     /// What stands at 21.05 s for a neighbour that said 10 at 16 s, heard at 21 s.
     fn stands_for(between: &str) -> f64 {
         let mission = mission(between);
         let mut neighbours = Neighbours::new(&mission, 1);
         neighbours.hear(Time::from_secs(21.0), &said(&mission, 0, 16.0, 10.0)).expect("sound");
-        neighbours.present(Time::from_secs(21.05), 0.5)[0].xi
+        neighbours.present(Time::from_secs(21.05), v_l)[0].xi
     }
 
     #[test]
@@ -159,12 +166,25 @@ mod tests {
     }
 
     #[test]
+    fn who_is_not_told_v_l_advances_at_what_the_neighbour_says() {
+        let mission = mission("advance");
+        let mut neighbours = Neighbours::new(&mission, 1);
+        let made = Time::from_secs(16.0);
+        let state =
+            CoordinationState { mission: mission.digest, sender: 0, seq: 1, made, xi: 10.0, scalar: Some(0.125) };
+        neighbours.hear(Time::from_secs(21.0), &state.encode()).expect("sound");
+        let now = Time::from_secs(24.0);
+        assert_eq!(neighbours.present(now, |scalar| scalar)[0].xi, 11.0);
+        assert_eq!(neighbours.present(now, |scalar| scalar)[0].said, 10.0);
+    }
+
+    #[test]
     fn a_neighbour_leaves_when_nothing_was_heard_of_it_for_the_validity() {
         let mission = mission("hold");
         let mut neighbours = Neighbours::new(&mission, 1);
         neighbours.hear(Time::from_secs(21.0), &said(&mission, 0, 16.0, 10.0)).expect("sound");
-        assert_eq!(neighbours.present(Time::from_secs(21.3), 0.5).len(), 1);
-        assert_eq!(neighbours.present(Time::from_secs(21.301), 0.5).len(), 0);
+        assert_eq!(neighbours.present(Time::from_secs(21.3), v_l).len(), 1);
+        assert_eq!(neighbours.present(Time::from_secs(21.301), v_l).len(), 0);
     }
 
     #[test]
@@ -175,7 +195,7 @@ mod tests {
         neighbours.hear(now, &said(&mission, 0, 20.0, 2.0)).expect("sound");
         assert_eq!(neighbours.hear(now, &said(&mission, 0, 19.0, 1.0)), Err(Garbage::Stale), "overtaken");
         assert_eq!(neighbours.hear(now, &said(&mission, 0, 20.0, 2.0)), Err(Garbage::Stale), "said twice");
-        assert_eq!(neighbours.present(now, 0.5)[0].xi, 2.0);
+        assert_eq!(neighbours.present(now, v_l)[0].xi, 2.0);
         assert_eq!(neighbours.garbage.of(Garbage::Stale), 2);
     }
 
@@ -191,7 +211,7 @@ mod tests {
         assert_eq!(neighbours.hear(now, &said(&mission, 1, 12.0, 0.0)), Err(Garbage::FromTheFuture));
         let other = Mission { digest: mission.digest ^ 1, ..mission.clone() };
         assert_eq!(neighbours.hear(now, &said(&other, 1, 9.0, 0.0)), Err(Garbage::WrongMission));
-        assert!(neighbours.present(now, 0.5).is_empty());
-        assert_eq!(neighbours.formation_xi(now, 0.5), None);
+        assert!(neighbours.present(now, v_l).is_empty());
+        assert_eq!(neighbours.formation_xi(now, v_l), None);
     }
 }

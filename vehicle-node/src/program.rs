@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use bus::console::StopFlag;
-use bus::drive::{Clock, Next, Port, Rest, drive};
+use bus::console::{Parent, StopFlag};
+use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::logs::Logs;
 use bus::setup::Endpoint;
@@ -48,6 +47,9 @@ pub struct Args {
     /// End when mission-control has collected the log of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
+    /// End when standard input is closed, but not before a flight under way is over: what started this process is gone
+    #[arg(long, hide = true)]
+    pub end_with_stdin: bool,
 }
 
 /// Runs the program to its end.
@@ -64,26 +66,25 @@ pub fn run(args: Args) -> ExitCode {
         }
     };
     stop.arm();
-    let mut port = VehiclePort {
+    let node = VehicleNode::new(&id);
+    let port = VehiclePort {
         logs: Logs::new(&args.logs, &id),
         id,
         line,
         stop,
         once: args.once,
+        parent: args.end_with_stdin.then(Parent::at_stdin),
         rest: Rest::default(),
         garbage: GarbageCount::default(),
         refused: None,
         recording_failed: false,
     };
-    let exit = fly(&mut port, &events);
+    let program = Shared::new(Program::new(node, port, Clock::Stopped));
+    let exit = drive(&program, &events);
+    let mut port = program.into_port();
     port.logs.close();
     port.line.close();
     exit
-}
-
-fn fly(port: &mut VehiclePort, events: &Receiver<LineEvent>) -> ExitCode {
-    let mut node = VehicleNode::new(&port.id);
-    drive(&mut node, port, &mut Clock::Stopped, events)
 }
 
 struct VehiclePort {
@@ -92,6 +93,8 @@ struct VehiclePort {
     logs: Logs,
     stop: StopFlag,
     once: bool,
+    /// Who started this process for itself.
+    parent: Option<Parent>,
     rest: Rest,
     garbage: GarbageCount,
     refused: Option<Refusal>,
@@ -174,7 +177,7 @@ impl Port for VehiclePort {
     }
 
     fn tend(&mut self, node: &VehicleNode) -> Next<Self> {
-        if let Some(failure) = self.logs.take_failure() {
+        if let Some(failure) = self.logs.tend() {
             // A vehicle under way is worth more than its log.
             let on = if node.phase() == Phase::Running { "; the flight goes on without it" } else { "" };
             tracing::error!("{}: {failure}{on}", self.id);
@@ -186,6 +189,10 @@ impl Port for VehiclePort {
         }
         if self.once && self.rest.is_over(node.phase() == Phase::Running) {
             tracing::warn!("{}: nothing to fly for ten minutes; ended", self.id);
+            return Next::Exit(self.exit_code());
+        }
+        if self.parent.as_ref().is_some_and(Parent::is_gone) && node.phase() != Phase::Running {
+            tracing::info!("{}: mission-control is gone; ended", self.id);
             return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {

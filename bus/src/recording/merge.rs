@@ -1,10 +1,11 @@
 //! The files of a fleet into one recording, and a cut file into a whole one.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use common::record::Row;
+use common::record::{Name, Record, Row};
 
 use super::order::canonical_order;
 use super::read::RowReader;
@@ -82,6 +83,10 @@ pub struct Merged {
     pub rows: u64,
     /// Inputs that ended in the middle; what their whole chunks held is in the output.
     pub incomplete: Vec<PathBuf>,
+    /// Inputs with damaged chunks, which were left out: how many, and what was wrong with the first.
+    pub damaged: Vec<(PathBuf, u64, String)>,
+    /// When the states of each vehicle begin \[ns\].
+    pub begins: BTreeMap<Name, i64>,
 }
 
 /// Merges recordings of one mission into `output`, in [canonical order](canonical_order); the same rows give the same
@@ -165,16 +170,18 @@ fn open_all<P: AsRef<Path>>(inputs: &[P]) -> Result<(Origin, Vec<Input>)> {
 fn merge_in_stream<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {
     let (origin, mut inputs) = open_all(inputs)?;
     let mut recorder = create(output, &origin)?;
+    let mut begins = BTreeMap::new();
     // At each turn, the input whose next row is earliest; on a tie the first, so that input order is kept.
     while let Some(input) =
         inputs.iter_mut().filter(|input| input.next.is_some()).min_by_key(|input| input.next.as_ref().map(time_of))
     {
         if let Some(row) = input.next.take() {
+            note_begin(&mut begins, &row);
             recorder.write(row)?;
         }
         input.next = input.rows.next().transpose()?;
     }
-    finish(recorder, output, &inputs)
+    finish(recorder, output, &inputs, begins)
 }
 
 fn merge_in_memory<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {
@@ -188,10 +195,21 @@ fn merge_in_memory<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged
     }
     all.sort_by(canonical_order);
     let mut recorder = create(output, &origin)?;
+    let mut begins = BTreeMap::new();
     for row in all {
+        note_begin(&mut begins, &row);
         recorder.write(row)?;
     }
-    finish(recorder, output, &inputs)
+    finish(recorder, output, &inputs, begins)
+}
+
+/// Rows come in order of time.
+fn note_begin(begins: &mut BTreeMap<Name, i64>, row: &Row) {
+    if let Row::Exact(Record::State(state)) = row
+        && !begins.contains_key(&state.vehicle)
+    {
+        begins.insert(state.vehicle.clone(), state.t_ns);
+    }
 }
 
 fn create(output: &Path, origin: &Origin) -> Result<CanonicalRecorder<BufWriter<File>>> {
@@ -200,13 +218,23 @@ fn create(output: &Path, origin: &Origin) -> Result<CanonicalRecorder<BufWriter<
     CanonicalRecorder::create(output, origin)
 }
 
-fn finish(mut recorder: CanonicalRecorder<BufWriter<File>>, output: &Path, inputs: &[Input]) -> Result<Merged> {
+fn finish(
+    mut recorder: CanonicalRecorder<BufWriter<File>>,
+    output: &Path,
+    inputs: &[Input],
+    begins: BTreeMap<Name, i64>,
+) -> Result<Merged> {
     recorder.close_instant()?;
     let rows = recorder.recorder.rows();
     let file = recorder.finish()?;
     file.get_ref().sync_all().map_err(|cause| RecordingError::io(output, cause))?;
-    let incomplete = inputs.iter().filter(|input| !input.rows.is_complete());
-    Ok(Merged { rows, incomplete: incomplete.map(|input| input.rows.place().to_owned()).collect() })
+    let place = |input: &Input| input.rows.place().to_owned();
+    let incomplete = inputs.iter().filter(|input| !input.rows.is_complete() && input.rows.skipped() == 0);
+    let damaged = inputs.iter().filter_map(|input| {
+        let cause = input.rows.damage().unwrap_or_default().to_owned();
+        (input.rows.skipped() > 0).then(|| (place(input), input.rows.skipped(), cause))
+    });
+    Ok(Merged { rows, incomplete: incomplete.map(place).collect(), damaged: damaged.collect(), begins })
 }
 
 /// The temporary file that becomes `output`; beside it, so that renaming does not copy.
@@ -318,7 +346,8 @@ mod tests {
         }
         let output = directory.path().join("recording.mcap");
         let merged = merge(&[&whole, &cut], &output).expect("merges");
-        assert_eq!(merged, Merged { rows: 3, incomplete: vec![cut.clone()] });
+        let begins = BTreeMap::from([("a".into(), 0)]);
+        assert_eq!(merged, Merged { rows: 3, incomplete: vec![cut.clone()], damaged: vec![], begins });
 
         let recovered = recover(&cut, directory.path().join("recovered.mcap")).expect("recovers");
         assert_eq!(recovered, Recovered { rows: 1, was_complete: false, damage: None });

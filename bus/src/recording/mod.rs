@@ -6,6 +6,7 @@
 //! | `/network/topology` | [`TopologyRow`](common::record::TopologyRow) | yes |
 //! | `/vehicles/<id>/state` | [`StateRow`](common::record::StateRow) | yes |
 //! | `/network/messages` | [`MessageRow`](common::record::MessageRow) | yes |
+//! | `/mission/warnings` | [`NoteRow`](common::record::NoteRow) | yes |
 //! | `/clock/achieved` | [`AchievedRow`](common::record::AchievedRow) | no |
 //! | `/clock/ticks` | [`TicksRow`](common::record::TicksRow) | no |
 //! | `/clock/notes` | [`NoteRow`](common::record::NoteRow) | no |
@@ -15,14 +16,18 @@
 //! `sequence` counts within a channel. The mission file is the attachment `mission.toml`, and the metadata record
 //! `mission` holds its digest and the seed. Nothing in a file depends on the host or on the time of day.
 //!
+//! The emulator's own log holds what became of messages in packs (`packed.rs`), which reading and merging turn into rows.
+//!
 //! Two writers, for two needs:
 //! - [`Recorder`] writes rows as they come; [`Recorder::flush_if_due`] closes the chunk by the wall clock, so that a
 //!   killed process loses what it recorded since the last flush and no more.
 //! - [`CanonicalRecorder`] writes rows in [`order`](canonical_order) and closes chunks by size alone, so that the same
 //!   rows give the same bytes. [`merge`] makes it of the files of a fleet.
 
+mod json;
 mod merge;
 mod order;
+pub(crate) mod packed;
 mod read;
 mod recorder;
 mod topic;
@@ -31,6 +36,7 @@ pub use merge::{CanonicalRecorder, Merged, Recovered, merge, recover};
 pub use order::{canonical_order, canonical_order_of_records};
 pub use read::{Recording, RowReader, read, read_from};
 pub use recorder::{FLUSH_PERIOD, Recorder};
+pub(crate) use topic::time_of;
 pub use topic::topic_of;
 
 use std::fmt;

@@ -6,7 +6,8 @@ use common::record::{ClockRecord, Record, Row};
 
 use super::topic::{Topic, time_of};
 
-/// Orders rows by mission time, then topic (speed, topology, states, messages, then the clock topics), then vehicle or
+/// Orders rows by mission time, then topic (speed, topology, states, messages,
+/// warnings, then the clock topics), then vehicle or
 /// link by name, then sequence number. Rows that compare equal keep the order in which they were recorded.
 pub fn canonical_order(a: &Row, b: &Row) -> Ordering {
     key(a).cmp(&key(b))
@@ -36,6 +37,7 @@ fn exact_key(record: &Record) -> Key<'_> {
         Record::Topology(row) => (Topic::Topology, &row.from, &row.to, 0),
         Record::State(row) => (Topic::State, &row.vehicle, "", 0),
         Record::Message(row) => (Topic::Message, &row.from, &row.to, row.seq),
+        Record::Warning(row) => (Topic::Warning, &row.source, &row.text, 0),
     };
     (record.t_ns(), topic, first, second, number)
 }

@@ -1,16 +1,17 @@
 //! Rows out of an MCAP file, also of one that ends in the middle.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use common::record::{ClockRecord, Record, Row};
+use common::record::{ClockRecord, Name, Record, Row};
 use mcap::McapError;
 use mcap::records::{self, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::recorder::{DIGEST, MISSION, MISSION_FILE, SEED};
+use super::packed::unpack;
+use super::recorder::{DIGEST, MISSION, MISSION_FILE, PACKED, SEED, SETTLED, VEHICLES};
 use super::topic::Topic;
 use super::{Origin, RecordingError, Result};
 
@@ -77,28 +78,48 @@ fn collect<R: Read>(mut rows: RowReader<R>) -> Result<Recording> {
 
 /// Reads a recording row by row; memory holds one chunk.
 ///
-/// A chunk is used whole or not at all. Where the file is cut or damaged the rows end, without an error; ask
+/// A chunk is used whole or not at all; a damaged one is skipped, and what follows is read. Where the file is cut, or so
+/// damaged that the next record cannot be found, the rows end. None of this is an error; ask
 /// [`is_complete`](RowReader::is_complete) and [`damage`](RowReader::damage) afterwards. An error means that the file
 /// cannot be read, is no recording at all, or holds rows of another version.
 pub struct RowReader<R: Read> {
     source: R,
     place: PathBuf,
     reader: LinearReader,
-    topics: HashMap<u16, Topic>,
-    origin: Origin,
-    pending: Option<Row>,
+    contents: Contents,
+    skipped: u64,
+    damage: Option<String>,
     end: End,
 }
 
+/// What was read.
+#[derive(Default)]
+struct Contents {
+    topics: HashMap<u16, Topic>,
+    /// The channels of packed messages, with the vehicles' names.
+    packs: HashMap<u16, Vec<Name>>,
+    origin: Origin,
+    /// Rows that were not handed out yet.
+    rows: VecDeque<Row>,
+}
+
 /// How far the reader is from the end of the file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     Ahead,
     Reached,
     Cut,
-    Damaged(String),
+    Damaged,
     /// An error was returned.
     Failed,
+}
+
+/// Why a record is of no use.
+enum Trouble {
+    /// It was damaged after it was written.
+    Damaged(String),
+    /// It was written so.
+    Foreign(String),
 }
 
 impl RowReader<BufReader<File>> {
@@ -110,42 +131,50 @@ impl RowReader<BufReader<File>> {
     }
 }
 
+fn options() -> LinearReaderOptions {
+    LinearReaderOptions::default()
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(LENGTH_LIMIT)
+}
+
 impl<R: Read> RowReader<R> {
     /// Reads from `source`; errors name it `place`. The origin is known when this returns.
     pub fn new(source: R, place: impl Into<PathBuf>) -> Result<Self> {
-        let options = LinearReaderOptions::default()
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LENGTH_LIMIT);
         let mut rows = RowReader {
             source,
             place: place.into(),
-            reader: LinearReader::new_with_options(options),
-            topics: HashMap::new(),
-            origin: Origin::default(),
-            pending: None,
+            reader: LinearReader::new_with_options(options().with_emit_chunks(true)),
+            contents: Contents::default(),
+            skipped: 0,
+            damage: None,
             end: End::Ahead,
         };
-        rows.pending = rows.next_row()?;
+        if let Some(first) = rows.next_row()? {
+            rows.contents.rows.push_front(first);
+        }
         Ok(rows)
     }
 
     /// What the recording says about the run as a whole.
     pub fn origin(&self) -> &Origin {
-        &self.origin
+        &self.contents.origin
     }
 
-    /// Whether the end of the file was reached as its writer meant it; known when the rows have ended.
+    /// Whether the end of the file was reached as its writer meant it, with nothing left out; known when the rows have
+    /// ended.
     pub fn is_complete(&self) -> bool {
-        self.end == End::Reached
+        self.end == End::Reached && self.skipped == 0
+    }
+
+    /// Chunks that were skipped because they are damaged.
+    pub fn skipped(&self) -> u64 {
+        self.skipped
     }
 
     /// What is wrong with the first bytes that could not be used, if that is more than a missing end.
     pub fn damage(&self) -> Option<&str> {
-        match &self.end {
-            End::Damaged(cause) => Some(cause),
-            _ => None,
-        }
+        self.damage.as_deref()
     }
 
     /// Where the rows come from.
@@ -154,24 +183,15 @@ impl<R: Read> RowReader<R> {
     }
 
     fn next_row(&mut self) -> Result<Option<Row>> {
-        while self.end == End::Ahead {
-            let event = match self.reader.next_event() {
-                Some(Ok(event)) => event,
-                Some(Err(McapError::UnexpectedEof)) | None => {
-                    self.end = End::Cut;
-                    break;
-                }
-                Some(Err(cause @ (McapError::BadMagic | McapError::UnsupportedCompression(_)))) => {
-                    self.end = End::Failed;
-                    return Err(RecordingError::mcap(&self.place, cause));
-                }
-                Some(Err(cause)) => {
-                    self.end = End::Damaged(cause.to_string());
-                    break;
-                }
-            };
-            let (opcode, data) = match event {
-                LinearReadEvent::ReadRequest(wanted) => {
+        loop {
+            if let Some(row) = self.contents.rows.pop_front() {
+                return Ok(Some(row));
+            }
+            if self.end != End::Ahead {
+                return Ok(None);
+            }
+            let taken = match self.reader.next_event() {
+                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
                     let buffer = self.reader.insert(wanted.min(READ_BYTES));
                     let read = read_some(&mut self.source, buffer).map_err(|cause| {
                         self.end = End::Failed;
@@ -180,40 +200,107 @@ impl<R: Read> RowReader<R> {
                     self.reader.notify_read(read);
                     continue;
                 }
-                LinearReadEvent::Record { opcode, data } => (opcode, data),
+                Some(Ok(LinearReadEvent::Record { opcode: op::CHUNK, data })) => self.contents.take_chunk(data),
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                    if opcode == op::FOOTER {
+                        self.end = End::Reached;
+                    }
+                    self.contents.take(opcode, data)
+                }
+                Some(Err(McapError::UnexpectedEof)) | None => {
+                    self.end = End::Cut;
+                    continue;
+                }
+                Some(Err(cause @ McapError::BadMagic)) => Err(Trouble::Foreign(cause.to_string())),
+                Some(Err(cause)) => {
+                    // Where the next record begins is not known.
+                    self.end = End::Damaged;
+                    Err(Trouble::Damaged(cause.to_string()))
+                }
             };
-            match mcap::parse_record(opcode, data) {
-                Ok(records::Record::Message { header, data }) => {
-                    let Some(topic) = self.topics.get(&header.channel_id) else { continue };
-                    match topic.decode(&data) {
-                        Ok(row) => return Ok(Some(row)),
-                        Err(cause) => {
-                            self.end = End::Failed;
-                            let what = format!("a row of {topic:?} cannot be read: {cause}");
-                            return Err(RecordingError::format(&self.place, what));
-                        }
-                    }
+            match taken {
+                Ok(()) => {}
+                Err(Trouble::Damaged(cause)) => {
+                    self.skipped += u64::from(self.end != End::Damaged);
+                    self.damage.get_or_insert(cause);
                 }
-                Ok(records::Record::Channel(channel)) => {
-                    // Topics of others are skipped: a recording may be enriched with views of it.
-                    if let Some(topic) = Topic::named(&channel.topic).filter(|_| channel.message_encoding == "json") {
-                        self.topics.insert(channel.id, topic);
-                    }
+                Err(Trouble::Foreign(cause)) => {
+                    self.end = End::Failed;
+                    return Err(RecordingError::format(&self.place, cause));
                 }
-                Ok(records::Record::Attachment { header, data, .. }) if header.name == MISSION_FILE => {
-                    self.origin.mission_toml = String::from_utf8_lossy(&data).into_owned();
-                }
-                Ok(records::Record::Metadata(metadata)) if metadata.name == MISSION => {
-                    self.origin.digest = metadata.metadata.get(DIGEST).cloned().unwrap_or_default();
-                    let seed = metadata.metadata.get(SEED).and_then(|seed| seed.parse().ok());
-                    self.origin.seed = seed.unwrap_or_default();
-                }
-                Ok(_) if opcode == op::FOOTER => self.end = End::Reached,
-                Ok(_) => {}
-                Err(cause) => self.end = End::Damaged(cause.to_string()),
             }
         }
-        Ok(None)
+    }
+}
+
+impl Contents {
+    /// Takes a chunk, whole or not at all.
+    fn take_chunk(&mut self, chunk: &[u8]) -> std::result::Result<(), Trouble> {
+        let mut head = vec![op::CHUNK];
+        head.extend((chunk.len() as u64).to_le_bytes());
+        let mut source = head.chain(chunk);
+        let mut reader = LinearReader::new_with_options(options().with_skip_start_magic(true));
+        let before = self.rows.len();
+        loop {
+            let taken = match reader.next_event() {
+                None | Some(Err(McapError::UnexpectedEof)) => return Ok(()),
+                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
+                    let buffer = reader.insert(wanted.min(READ_BYTES));
+                    // Memory does not fail to be read.
+                    let read = source.read(buffer).unwrap_or(0);
+                    reader.notify_read(read);
+                    continue;
+                }
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => self.take(opcode, data),
+                Some(Err(cause)) => Err(Trouble::Damaged(cause.to_string())),
+            };
+            if taken.is_err() {
+                self.rows.truncate(before);
+                return taken;
+            }
+        }
+    }
+
+    /// Takes a record.
+    fn take(&mut self, opcode: u8, data: &[u8]) -> std::result::Result<(), Trouble> {
+        match mcap::parse_record(opcode, data) {
+            Ok(records::Record::Message { header, data }) => {
+                if let Some(vehicles) = self.packs.get(&header.channel_id) {
+                    let unpacked = unpack(&data, vehicles, |row| self.rows.push_back(row));
+                    return unpacked.then_some(()).ok_or(Trouble::Foreign("a pack of messages cannot be read".into()));
+                }
+                let Some(topic) = self.topics.get(&header.channel_id) else { return Ok(()) };
+                let row = topic.decode(&data);
+                self.rows.push_back(
+                    row.map_err(|cause| Trouble::Foreign(format!("a row of {topic:?} cannot be read: {cause}")))?,
+                );
+            }
+            Ok(records::Record::Channel(channel)) if channel.topic == SETTLED && channel.message_encoding == PACKED => {
+                let names = channel.metadata.get(VEHICLES).map_or("", String::as_str);
+                self.packs.insert(channel.id, names.split(',').map(Name::from).collect());
+            }
+            Ok(records::Record::Channel(channel)) => {
+                // Topics of others are skipped: a recording may be enriched with views of it.
+                if let Some(topic) = Topic::named(&channel.topic).filter(|_| channel.message_encoding == "json") {
+                    self.topics.insert(channel.id, topic);
+                }
+            }
+            Ok(records::Record::Attachment { header, data, .. }) if header.name == MISSION_FILE => {
+                self.origin.mission_toml = String::from_utf8_lossy(&data).into_owned();
+            }
+            Ok(records::Record::Metadata(metadata)) if metadata.name == MISSION => {
+                self.origin.digest = metadata.metadata.get(DIGEST).cloned().unwrap_or_default();
+                let seed = metadata.metadata.get(SEED).and_then(|seed| seed.parse().ok());
+                self.origin.seed = seed.unwrap_or_default();
+            }
+            // Other programs' records have numbers from 0x80 on.
+            Ok(records::Record::Unknown { opcode: ..0x80, .. }) => {
+                return Err(Trouble::Damaged(format!("there is no record of kind {opcode:#04x}")));
+            }
+            Ok(_) => {}
+            Err(cause) => return Err(Trouble::Damaged(cause.to_string())),
+        }
+        Ok(())
     }
 }
 
@@ -221,10 +308,7 @@ impl<R: Read> Iterator for RowReader<R> {
     type Item = Result<Row>;
 
     fn next(&mut self) -> Option<Result<Row>> {
-        match self.pending.take() {
-            Some(row) => Some(Ok(row)),
-            None => self.next_row().transpose(),
-        }
+        self.next_row().transpose()
     }
 }
 
@@ -267,8 +351,10 @@ mod tests {
             let recording = read_from(&file[..length], "cut.mcap").expect("reads");
             let whole = ends.iter().filter(|end| **end <= length).count();
             let rows = recording.exact.len() + recording.clock.len();
-            // Indexes follow the rows of a chunk: rows may be there before the chunk's last byte is.
-            assert!(rows == whole * ROWS_PER_TICK || rows == (whole + 1) * ROWS_PER_TICK, "{length}: {rows}");
+            // Indexes follow the rows of a chunk: rows may be there before the chunk's last byte is. And the rows of the
+            // first tick are in many chunks, for each begins a channel.
+            let expected = |rows| rows == whole * ROWS_PER_TICK || rows == (whole + 1) * ROWS_PER_TICK;
+            assert!(expected(rows) || (whole == 0 && rows <= ROWS_PER_TICK), "{length}: {rows}");
             assert_eq!(recording.damage, None, "{length}");
             // The last bytes are the magic, after the end proper.
             assert!(!recording.complete || length >= file.len() - mcap::MAGIC.len(), "{length}");
@@ -276,14 +362,36 @@ mod tests {
         assert!(read_from(&file[..], "whole.mcap").expect("reads").complete);
     }
 
+    /// Wherever a byte is wrong: the rows of the other chunks are read, in order, and the damage is told. (A wrong length
+    /// is where the file ends.)
     #[test]
-    fn a_damaged_chunk_ends_the_rows_and_is_named() {
-        let (mut file, ends) = chunked(3);
-        file[ends[0] + 200] ^= 0xff;
-        let recording = read_from(&file[..], "damaged.mcap").expect("reads");
-        assert_eq!(recording.exact.len() + recording.clock.len(), ROWS_PER_TICK);
-        assert!(!recording.complete);
-        assert!(recording.damage.is_some());
+    fn a_damaged_chunk_is_skipped_and_named() {
+        let (sound, ends) = chunked(4);
+        let all = read_from(&sound[..], "sound.mcap").expect("reads").exact;
+        let (mut skipped, mut ended) = (0, 0);
+        // The channels are in the first chunks.
+        for at in (ends[0]..ends[2]).step_by(3) {
+            let mut file = sound.clone();
+            file[at] ^= 0x55;
+            let recording = read_from(&file[..], "damaged.mcap").expect("reads");
+            let of_chunk = |t_ns: i64| all.iter().filter(|row| row.t_ns() == t_ns).cloned().collect::<Vec<_>>();
+            let damaged = if at < ends[1] { 1 } else { 2 };
+            let others: Vec<Record> = (0..4).filter(|t| *t != damaged).flat_map(of_chunk).collect();
+            let first: Vec<Record> = (0..damaged).flat_map(of_chunk).collect();
+            match recording.exact {
+                rows if rows == all => {}
+                rows if rows == others => {
+                    skipped += 1;
+                    assert!(!recording.complete && recording.damage.is_some(), "{at}");
+                }
+                rows => {
+                    ended += 1;
+                    assert!(!recording.complete, "{at}");
+                    assert!(rows.starts_with(&first), "{at}");
+                }
+            }
+        }
+        assert!(skipped > 150 && skipped > 10 * ended, "{skipped} skipped, {ended} ended");
     }
 
     #[test]

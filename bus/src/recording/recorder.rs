@@ -6,10 +6,11 @@ use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use common::record::{ClockRecord, NoteRow, Record, Row};
+use common::record::{ClockRecord, Name, NoteRow, Record, Row};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 
+use super::packed::Pack;
 use super::topic::{Topic, is_finite, time_of};
 use super::{Cause, Origin, RecordingError, Result};
 
@@ -30,6 +31,8 @@ pub struct Recorder<W: Write + Seek> {
     shared: [Option<Channel>; Topic::COUNT],
     /// One channel per vehicle, in the order of first appearance.
     vehicles: Vec<(String, Channel)>,
+    /// The channel of packed messages.
+    settled: Option<Channel>,
     /// Where the next state row is looked for first: vehicles come in turn.
     next_vehicle: usize,
     /// Reused for every row.
@@ -91,6 +94,7 @@ impl<W: Write + Seek> Recorder<W> {
             place,
             shared: [None; Topic::COUNT],
             vehicles: Vec::new(),
+            settled: None,
             next_vehicle: 0,
             json: Vec::with_capacity(1024),
             rows: 0,
@@ -112,6 +116,35 @@ impl<W: Write + Seek> Recorder<W> {
             return Ok(());
         }
         self.write_finite(row).map_err(|cause| self.stop(cause))
+    }
+
+    /// Writes what became of messages in a fleet of these vehicles.
+    pub(crate) fn write_pack(&mut self, pack: &Pack, vehicles: &[Name]) -> Result<()> {
+        if let Some(first) = &self.failure {
+            return Err(RecordingError { place: self.place.clone(), cause: Cause::Stopped(first.clone()) });
+        }
+        self.try_pack(pack, vehicles).map_err(|cause| self.stop(cause))
+    }
+
+    fn try_pack(&mut self, pack: &Pack, vehicles: &[Name]) -> mcap::McapResult<()> {
+        let mut channel = match self.settled {
+            Some(channel) => channel,
+            None => {
+                let metadata = BTreeMap::from([(VEHICLES.to_owned(), vehicles.join(","))]);
+                let id = self.mcap.add_channel(0, SETTLED, PACKED, &metadata)?;
+                self.mcap.flush()?;
+                Channel { id, sequence: 0 }
+            }
+        };
+        let log_time = u64::try_from(pack.t_ns).unwrap_or(0);
+        let header =
+            MessageHeader { channel_id: channel.id, sequence: channel.sequence, log_time, publish_time: log_time };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        self.settled = Some(channel);
+        self.mcap.write_to_known_channel(&header, &pack.bytes)?;
+        self.last_t_ns = pack.t_ns;
+        self.unflushed = true;
+        Ok(())
     }
 
     /// Writes the open chunk to the file. After this, `kill -9` cannot take away what was recorded before.
@@ -242,8 +275,16 @@ fn add_channel<W: Write + Seek>(mcap: &mut Writer<W>, topic: Topic, vehicle: &st
     let (name, schema) = topic.schema();
     let schema = mcap.add_schema(name, "jsonschema", &schema)?;
     let id = mcap.add_channel(schema, &topic.name(vehicle), "json", &BTreeMap::new())?;
+    // In a chunk of its own: a damaged row must not take along what the later ones need.
+    mcap.flush()?;
     Ok(Channel { id, sequence: 0 })
 }
+
+/// The topic of packed messages, their encoding, and the key of the vehicles' names in the channel's metadata. (No vehicle's
+/// name has a comma.)
+pub(super) const SETTLED: &str = "/network/settled";
+pub(super) const PACKED: &str = "cpf-packed";
+pub(super) const VEHICLES: &str = "vehicles";
 
 /// Name of the attachment that holds the mission file.
 pub(super) const MISSION_FILE: &str = "mission.toml";

@@ -8,13 +8,14 @@ use common::record::{
 use schemars::generate::SchemaSettings;
 
 /// The kind of a topic; the discriminant is its rank in the canonical order. Exact topics rank before clock topics,
-/// and within one instant the order is that of a tick: command, network, vehicles, messages.
+/// and within one instant the order is that of a tick: command, network, vehicles, messages, warnings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Topic {
     Speed,
     Topology,
     State,
     Message,
+    Warning,
     Achieved,
     Ticks,
     Note,
@@ -24,7 +25,7 @@ const STATE_PREFIX: &str = "/vehicles/";
 const STATE_SUFFIX: &str = "/state";
 
 impl Topic {
-    pub(super) const COUNT: usize = 7;
+    pub(super) const COUNT: usize = 8;
 
     pub(super) fn of(row: &Row) -> Topic {
         match row {
@@ -32,6 +33,7 @@ impl Topic {
             Row::Exact(Record::Topology(_)) => Topic::Topology,
             Row::Exact(Record::State(_)) => Topic::State,
             Row::Exact(Record::Message(_)) => Topic::Message,
+            Row::Exact(Record::Warning(_)) => Topic::Warning,
             Row::Clock(ClockRecord::Achieved(_)) => Topic::Achieved,
             Row::Clock(ClockRecord::Ticks(_)) => Topic::Ticks,
             Row::Clock(ClockRecord::Note(_)) => Topic::Note,
@@ -45,6 +47,7 @@ impl Topic {
             Topic::Topology => "/network/topology".into(),
             Topic::State => format!("{STATE_PREFIX}{vehicle}{STATE_SUFFIX}").into(),
             Topic::Message => "/network/messages".into(),
+            Topic::Warning => "/mission/warnings".into(),
             Topic::Achieved => "/clock/achieved".into(),
             Topic::Ticks => "/clock/ticks".into(),
             Topic::Note => "/clock/notes".into(),
@@ -57,6 +60,7 @@ impl Topic {
             "/mission/speed" => Some(Topic::Speed),
             "/network/topology" => Some(Topic::Topology),
             "/network/messages" => Some(Topic::Message),
+            "/mission/warnings" => Some(Topic::Warning),
             "/clock/achieved" => Some(Topic::Achieved),
             "/clock/ticks" => Some(Topic::Ticks),
             "/clock/notes" => Some(Topic::Note),
@@ -75,7 +79,7 @@ impl Topic {
             Topic::Message => ("cpf.Message", generator.into_root_schema_for::<MessageRow>()),
             Topic::Achieved => ("cpf.Achieved", generator.into_root_schema_for::<AchievedRow>()),
             Topic::Ticks => ("cpf.Ticks", generator.into_root_schema_for::<TicksRow>()),
-            Topic::Note => ("cpf.Note", generator.into_root_schema_for::<NoteRow>()),
+            Topic::Warning | Topic::Note => ("cpf.Note", generator.into_root_schema_for::<NoteRow>()),
         };
         (name, schema.as_value().to_string().into_bytes())
     }
@@ -87,20 +91,31 @@ impl Topic {
             Topic::Topology => Row::Exact(Record::Topology(serde_json::from_slice(json)?)),
             Topic::State => Row::Exact(Record::State(serde_json::from_slice(json)?)),
             Topic::Message => Row::Exact(Record::Message(serde_json::from_slice(json)?)),
+            Topic::Warning => Row::Exact(Record::Warning(serde_json::from_slice(json)?)),
             Topic::Achieved => Row::Clock(ClockRecord::Achieved(serde_json::from_slice(json)?)),
             Topic::Ticks => Row::Clock(ClockRecord::Ticks(serde_json::from_slice(json)?)),
             Topic::Note => Row::Clock(ClockRecord::Note(serde_json::from_slice(json)?)),
         })
     }
 
-    /// Appends the row as JSON.
+    /// Appends the row, whose numbers are finite, as JSON.
     pub(super) fn encode(row: &Row, json: &mut Vec<u8>) -> serde_json::Result<()> {
         match row {
             Row::Exact(Record::Speed(row)) => serde_json::to_writer(json, row),
             Row::Exact(Record::Topology(row)) => serde_json::to_writer(json, row),
-            Row::Exact(Record::State(row)) => serde_json::to_writer(json, row),
-            Row::Exact(Record::Message(row)) => serde_json::to_writer(json, row),
-            Row::Clock(ClockRecord::Achieved(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::Warning(row)) => serde_json::to_writer(json, row),
+            Row::Exact(Record::State(row)) => {
+                super::json::state(row, json);
+                Ok(())
+            }
+            Row::Exact(Record::Message(row)) => {
+                super::json::message(row, json);
+                Ok(())
+            }
+            Row::Clock(ClockRecord::Achieved(row)) => {
+                super::json::achieved(row, json);
+                Ok(())
+            }
             Row::Clock(ClockRecord::Ticks(row)) => serde_json::to_writer(json, row),
             Row::Clock(ClockRecord::Note(row)) => serde_json::to_writer(json, row),
         }
@@ -117,7 +132,7 @@ pub fn topic_of(row: &Row) -> Cow<'static, str> {
 }
 
 /// When the row was written, in mission time \[ns\].
-pub(super) fn time_of(row: &Row) -> i64 {
+pub(crate) fn time_of(row: &Row) -> i64 {
     match row {
         Row::Exact(record) => record.t_ns(),
         Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,

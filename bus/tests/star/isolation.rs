@@ -30,11 +30,11 @@ fn a_line_that_subscribes_to_everything_hears_only_its_inbox() {
     for key in ["cpf/nosy/down/state", "cpf/nosy/down/mission", "cpf/auv1/down/state", "x"] {
         accomplice.put(key, "forged").wait().expect("open");
     }
-    accomplice.put("cpf/nosy/up/state", "fence").wait().expect("open");
+    accomplice.put("cpf/nosy/up/state", alone(b"fence")).wait().expect("open");
     assert_eq!(expect_up(&hub_events, nosy_line), (Plane::State, b"fence".to_vec()));
 
     hub.send(nosy_line, Plane::State, b"for nosy").expect("joined");
-    assert_eq!(next(&hears), ("cpf/nosy/down/state".into(), b"for nosy".to_vec()));
+    assert_eq!(next(&hears), ("cpf/nosy/down/state".into(), alone(b"for nosy")));
     assert!(hears.try_recv().is_err());
 }
 
@@ -66,7 +66,7 @@ fn what_is_put_on_any_other_key_goes_nowhere() {
         rogue.delete(key).wait().expect("open");
     }
     rogue.delete("cpf/rogue/up/state").wait().expect("open");
-    rogue.put("cpf/rogue/up/state", "fence").wait().expect("open");
+    rogue.put("cpf/rogue/up/state", alone(b"fence")).wait().expect("open");
     assert_eq!(expect_up(&hub_events, rogue_line), (Plane::State, b"fence".to_vec()), "and nothing before it");
 
     hub.send(auv_line, Plane::State, b"fence").expect("joined");

@@ -4,8 +4,8 @@ use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use crate::support::*;
-use bus::clock::{Wake, recv_until};
 use bus::line::{Line, LineConfig, LineEvent};
+use bus::queue::{Wake, recv_until};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, Switchboard, SwitchboardConfig};
 use bus::{Error, Plane, Refusal};
@@ -108,7 +108,7 @@ fn a_line_outlives_its_hub() {
 
 #[test]
 fn a_hub_that_closes_says_good_bye_after_its_last_word() {
-    let (hub, hub_events) = hub();
+    let (mut hub, hub_events) = hub();
     let (line, events, number) = joined(&hub, &hub_events, "auv1");
     let last_word = vec![7; 3 << 20];
     hub.send(number, Plane::Mission, &last_word).expect("joined");

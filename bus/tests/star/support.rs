@@ -2,11 +2,11 @@
 
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, Sender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use bus::clock::{Wake, recv_until};
 use bus::line::{Line, LineConfig, LineEvent};
+use bus::queue::Events;
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use bus::{PROTOCOL_VERSION, Plane};
@@ -16,12 +16,37 @@ use zenoh::{Config, Session, Wait};
 pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The next event; a failure if there is none in time.
-pub(crate) fn next<T>(receiver: &Receiver<T>) -> T {
-    match recv_until(receiver, Some(Instant::now() + PATIENCE)) {
-        Wake::Message(event) => event,
-        Wake::Deadline => panic!("nothing happened for {PATIENCE:?}"),
-        Wake::Closed => panic!("the queue is closed"),
+pub(crate) fn next<Q: Queue>(queue: &Q) -> Q::Item {
+    match queue.next_within(PATIENCE) {
+        Ok(event) => event,
+        Err(RecvTimeoutError::Timeout) => panic!("nothing happened for {PATIENCE:?}"),
+        Err(RecvTimeoutError::Disconnected) => panic!("the queue is closed"),
     }
+}
+
+/// What a test waits on.
+pub(crate) trait Queue {
+    type Item;
+    fn next_within(&self, patience: Duration) -> Result<Self::Item, RecvTimeoutError>;
+}
+
+impl<T> Queue for Receiver<T> {
+    type Item = T;
+    fn next_within(&self, patience: Duration) -> Result<T, RecvTimeoutError> {
+        self.recv_timeout(patience)
+    }
+}
+
+impl<T> Queue for Events<T> {
+    type Item = T;
+    fn next_within(&self, patience: Duration) -> Result<T, RecvTimeoutError> {
+        self.recv_timeout(patience)
+    }
+}
+
+/// A state-plane message as a bundle of its own.
+pub(crate) fn alone(message: &[u8]) -> Vec<u8> {
+    [&(message.len() as u16).to_le_bytes(), message].concat()
 }
 
 pub(crate) fn any_port() -> Endpoint {
@@ -34,11 +59,11 @@ pub(crate) fn free_endpoint() -> Endpoint {
     Endpoint::local().with_port(listener.local_addr().expect("bound").port())
 }
 
-pub(crate) fn hub() -> (Switchboard, Receiver<HubEvent>) {
+pub(crate) fn hub() -> (Switchboard, Events<HubEvent>) {
     Switchboard::open(SwitchboardConfig::new(any_port())).expect("the hub opens")
 }
 
-pub(crate) fn line(endpoint: &Endpoint, id: &str) -> (Line, Receiver<LineEvent>) {
+pub(crate) fn line(endpoint: &Endpoint, id: &str) -> (Line, Events<LineEvent>) {
     let mut config = LineConfig::new(endpoint.clone(), id);
     config.patience = Some(PATIENCE);
     config.queue = 1 << 16;
@@ -48,31 +73,27 @@ pub(crate) fn line(endpoint: &Endpoint, id: &str) -> (Line, Receiver<LineEvent>)
 }
 
 /// Connects a participant and takes the hub's `Joined` from its queue.
-pub(crate) fn joined(
-    hub: &Switchboard,
-    hub_events: &Receiver<HubEvent>,
-    id: &str,
-) -> (Line, Receiver<LineEvent>, LineId) {
+pub(crate) fn joined(hub: &Switchboard, hub_events: &Events<HubEvent>, id: &str) -> (Line, Events<LineEvent>, LineId) {
     let (line, events) = line(hub.endpoint(), id);
     let number = expect_joined(hub_events, id);
     (line, events, number)
 }
 
-pub(crate) fn expect_joined(hub_events: &Receiver<HubEvent>, expected: &str) -> LineId {
+pub(crate) fn expect_joined(hub_events: &Events<HubEvent>, expected: &str) -> LineId {
     match next(hub_events) {
         HubEvent::Joined { line, id } if id == expected => line,
         other => panic!("{expected} should have joined, but {other:?}"),
     }
 }
 
-pub(crate) fn expect_up(hub_events: &Receiver<HubEvent>, from: LineId) -> (Plane, Vec<u8>) {
+pub(crate) fn expect_up(hub_events: &Events<HubEvent>, from: LineId) -> (Plane, Vec<u8>) {
     match next(hub_events) {
         HubEvent::Packet { line, plane, bytes, .. } if line == from => (plane, bytes),
         other => panic!("{from} should have sent something, but {other:?}"),
     }
 }
 
-pub(crate) fn expect_down(events: &Receiver<LineEvent>) -> (Plane, Vec<u8>) {
+pub(crate) fn expect_down(events: &Events<LineEvent>) -> (Plane, Vec<u8>) {
     match next(events) {
         LineEvent::Packet { plane, bytes, .. } => (plane, bytes),
         other => panic!("a packet should have arrived, but {other:?}"),

@@ -3,23 +3,38 @@
 //! | law | source | equation | demand | hears | file |
 //! |---|---|---|---|---|---|
 //! | two vehicles on lines | section 1.2 | ẋ_i = −a_i (x_i − x_j) + v_L (1.5) | rate | ξ_j | [`introduction_1_5`] |
+//! | two vehicles, one of which learns v_L | section 1.2 | ẋ_2 = −a_2 (x_2 − x_1) + b_2 e_I, after (1.5) | rate | ξ_j | [`leader_1_5`] |
 //! | solution I | Proposition 3.4 | u = −(LC + C + A)η − ALξ (3.43) | acceleration | ξ_j, η_j/R_j | [`solution_1_3_43`] |
 //! | solution II | Proposition 3.4 | u = −Aη − BCLξ (3.44) | acceleration | ξ_j | [`solution_2_3_44`] |
 //! | solution III | Proposition 3.5 | u = −(A⁻¹L + A)Cη − B sat(η + A⁻¹Lξ) (3.45) | acceleration | ξ_j, η_j/R_j | [`solution_3_3_45`] |
+//! | weighted links | Remark 3.10 | u_i = −a_i η_i − b_i/R_i Σ w_k (ξ_i − ξ_j) (3.62) | acceleration | ξ_j | [`weighted_3_62`] |
+//! | moving pattern | section 3.3.3 | solution III about ξ − h(t) (3.70) | acceleration | ξ_j − h_j, η_j/R_j − h_j' | [`pattern_3_70`] |
+//! | one-way links | Proposition 3.6 | u = −Aη − BC⁻¹Lξ (3.72) | acceleration | ξ_j | [`directed_3_72`] |
+//! | one-way links, solution II | Remark 3.13 | u = −Aη − BCLξ (3.83) | acceleration | ξ_j | [`solution_2_3_44`] |
+//! | one-way links, fixed pattern | Remark 3.15 | u = −Aη − BC⁻¹L(ξ − h) (3.86) | acceleration | ξ_j − h_j | [`directed_3_72`] |
+//! | one vehicle is told v_L | Proposition 3.7 | F = −aC⁻¹LCv − bC⁻¹Lξ (3.90)–(3.92) | forward acceleration | ξ_j, v_j/R_j | [`decentralised_3_92`] |
 //! | switching network | Theorems 4.4 and 4.5 | v_r = v_L − k_i Σ(γ_i − γ_j) (4.21) | rate | γ_j | [`switching_4_21`] |
 //! | delay, never alone | Lemma 4.4 | v_r = v_L − k/\|N_i\| Σ(γ_i − γ_j(t−τ)) (4.34) | rate | γ_j | [`delayed_4_34`] |
 //! | delay, at times alone | Lemma 4.5 | (4.34), and v_L* when N_i is empty (4.42) | rate | γ_j | [`delayed_4_42`] |
+//! | auxiliary state, fixed network | Theorem 4.8 | γ̇ = v_L + z − A₁⁻¹(Lγ + α_2) (4.59)–(4.61) | rate | γ_j | [`auxiliary_4_59`] |
+//! | auxiliary state, switching network | Theorem 4.9 | the same with α_2 ≡ 0 (4.62) | rate | γ_j | [`auxiliary_4_59`] |
 //!
 //! What all of them need of the neighbours is in [`disagreement`].
 
+pub mod auxiliary_4_59;
+pub mod decentralised_3_92;
 pub mod delayed_4_34;
 pub mod delayed_4_42;
+pub mod directed_3_72;
 pub mod disagreement;
 pub mod introduction_1_5;
+pub mod leader_1_5;
+pub mod pattern_3_70;
 pub mod solution_1_3_43;
 pub mod solution_2_3_44;
 pub mod solution_3_3_45;
 pub mod switching_4_21;
+pub mod weighted_3_62;
 
 /// What the fleet is asked to do: the formation speed and its derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -122,6 +137,12 @@ pub trait VehicleLaw: Send + std::fmt::Debug {
     fn advance(&mut self, dt: f64) {
         let _ = dt;
     }
+    /// The rate at which a neighbour is taken to have moved on since it spoke \[units of ξ per s\], if the mission has its
+    /// word advanced: v_L, but for a vehicle that is not told v_L. `scalar` is what the neighbour said beside ξ.
+    fn neighbour_rate(&self, reference: SpeedReference, scalar: f64) -> f64 {
+        let _ = scalar;
+        reference.v_l
+    }
     /// The one more scalar that goes on the air beside ξ. Always `Some` if [`FleetLaw::says`] is, else always `None`.
     fn says(&self, own: &Own) -> Option<f64> {
         let _ = own;
@@ -159,3 +180,5 @@ impl<L: CoordinationLaw> VehicleLaw for Stateless<L> {
 
 #[cfg(test)]
 mod ideal_fleet;
+#[cfg(test)]
+mod sampled_fleet;

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Craft, Observation};
+use super::{Craft, LIMITED, Observation, REFUSED, SATURATED, Warning};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::theorem_4_7::{TargetMotion, TargetRate, Theorem47};
 use crate::path::{Path, PathPoint};
-use crate::vehicle::attitude::{wrap, yaw_pitch_roll};
+use crate::vehicle::attitude::{from_yaw_pitch_roll, wrap, yaw_pitch_roll};
 use crate::vehicle::auv::{AuvInput, AuvState};
+use crate::vehicle::environment::Conditions;
 
 /// One vehicle of section 4.6.
 #[derive(Debug)]
@@ -25,6 +26,7 @@ pub struct AuvCraft {
     /// η of (4.53); zero under type II.
     eta: f64,
     held: Held,
+    conditions: Conditions,
     limited: u64,
     saturated: u64,
     refused: u64,
@@ -64,6 +66,7 @@ impl AuvCraft {
             target,
             eta: 0.0,
             held,
+            conditions: Conditions::default(),
             limited: 0,
             saturated: 0,
             refused: 0,
@@ -90,6 +93,16 @@ impl AuvCraft {
     pub fn refused(&self) -> u64 {
         self.refused
     }
+    /// Its state as its instruments tell it: the heading errs about the vertical.
+    fn measured(&self) -> AuvState {
+        let Some(errors) = self.conditions.errors else { return self.state };
+        AuvState {
+            position: self.state.position + errors.position,
+            attitude: from_yaw_pitch_roll(errors.heading, 0.0, 0.0) * self.state.attitude,
+            velocity: self.state.velocity + errors.velocity,
+            spin: self.state.spin + errors.spin,
+        }
+    }
     /// p − p_d in the inertial frame.
     fn error(&self) -> Vector3<f64> {
         self.state.position - self.target.p
@@ -101,8 +114,17 @@ impl Craft for AuvCraft {
         DemandKind::Rate
     }
 
-    fn own(&self, _reference: SpeedReference) -> Own {
-        Own { xi: self.gamma, eta: 0.0, r: self.target.d1.norm(), ..Own::default() }
+    fn expose(&mut self, conditions: &Conditions) {
+        self.conditions = *conditions;
+        if let Some(speed) = conditions.stuck_speed {
+            self.state.velocity.x = speed;
+        }
+    }
+
+    /// With α_2 of the present state, which does not depend on the rate that is yet to be decided.
+    fn own(&self, reference: SpeedReference) -> Own {
+        let alpha_2 = self.law.alpha_2(&self.measured(), &self.target, self.nominal_factor * reference.v_l);
+        Own { xi: self.gamma, eta: 0.0, r: self.target.d1.norm(), alpha_2, ..Own::default() }
     }
 
     fn command(&mut self, reference: SpeedReference, demand: Demand) {
@@ -115,7 +137,7 @@ impl Craft for AuvCraft {
             nominal_dot: self.nominal_factor * reference.v_l_dot,
             actual: v_r + self.eta,
         };
-        let answer = self.law.evaluate(&self.state, &self.target, rate);
+        let answer = self.law.evaluate(&self.measured(), &self.target, rate);
         self.limited += u64::from(answer.limited);
         if answer.input.is_finite() && answer.alpha_2.is_finite() {
             let input = self.law.auv().saturate(&answer.input);
@@ -131,6 +153,12 @@ impl Craft for AuvCraft {
         let h = dt / substeps as f64;
         for _ in 0..substeps {
             self.state = self.law.auv().step(&self.state, &self.held.input, h);
+            if let Some(speed) = self.conditions.stuck_speed {
+                self.state.velocity.x = speed;
+            }
+        }
+        if let Some(drift) = self.conditions.drift(dt) {
+            self.state.position += drift;
         }
         self.gamma += self.held.rate * dt;
         self.target = self.path.at(self.gamma);
@@ -167,6 +195,12 @@ impl Craft for AuvCraft {
     fn is_sound(&self) -> bool {
         self.state.is_finite() && self.gamma.is_finite() && self.eta.is_finite()
     }
+
+    fn warnings(&self) -> Vec<Warning> {
+        [(LIMITED, self.limited), (SATURATED, self.saturated), (REFUSED, self.refused)]
+            .map(|(what, count)| Warning { what, count })
+            .to_vec()
+    }
 }
 
 /// (4.53): η̇ = −α₂ − k_η η, solved over `dt` for a held α₂.
@@ -180,7 +214,9 @@ mod tests {
     use super::*;
     use crate::following::theorem_4_7::Gains;
     use crate::following::theorem_4_7::tests::Helix;
+    use crate::path::line::Line;
     use crate::vehicle::attitude::from_yaw_pitch_roll;
+    use crate::vehicle::environment::InstrumentErrors;
     use crate::vehicle::sirene::sirene;
     use nalgebra::UnitQuaternion;
 
@@ -289,6 +325,36 @@ mod tests {
         craft.command(SpeedReference::default(), Demand::Acceleration(1.0));
         assert_eq!(craft.refused(), refused + 21);
         assert!(craft.is_sound());
+    }
+
+    #[test]
+    fn a_current_along_a_line_acts_as_a_target_that_is_slower_by_as_much() {
+        // ė gains c where a surplus rate of the target takes (γ̇ − v_n)|p'|; on a line nothing else changes.
+        for current in [-0.05, 0.05] {
+            let line = Line::new(Vector3::zeros(), 0.0, 1.0).expect("a line");
+            let state = AuvState::at_rest(Vector3::new(0.0, 1.0, 0.0), UnitQuaternion::identity());
+            let mut craft = AuvCraft::new(law(), TargetMotion::TypeII, 1.0, Arc::new(line), state, 0.0);
+            let conditions = Conditions { current: Some(Vector3::new(current, 0.0, 0.0)), ..Conditions::default() };
+            craft.expose(&conditions);
+            fly(&mut craft, 0.15, 0.15, 400.0);
+            let bias = craft.law().gains().predicted_bias_at(craft.law().auv(), -current);
+            let seen = craft.observe();
+            assert!((seen.e_along - bias).abs() < 1e-3 && seen.e_cross < 1e-3, "{current}: {seen:?}, {bias}");
+            assert!((seen.speed - (0.15 - current)).abs() < 1e-4, "through the water");
+        }
+    }
+
+    #[test]
+    fn a_stuck_speed_holds_and_errors_do_not_reach_the_record() {
+        let mut craft = craft(0, TargetMotion::TypeII, 1.0);
+        let errors = InstrumentErrors { heading: 0.5, position: Vector3::x(), ..InstrumentErrors::default() };
+        craft.expose(&Conditions { errors: Some(errors), stuck_speed: Some(0.4), ..Conditions::default() });
+        let (seen, measured) = (craft.observe(), craft.measured());
+        assert_eq!((seen.position[0], seen.attitude[0]), (5.0, 0.0));
+        assert!((yaw_pitch_roll(&measured.attitude)[0] - 0.5).abs() < 1e-15 && measured.position.x == 6.0);
+        fly(&mut craft, 0.5, 0.5, 5.0);
+        assert_eq!(craft.state.velocity.x, 0.4);
+        assert!(craft.warnings().iter().all(|warning| warning.count == 0), "{:?}", craft.warnings());
     }
 
     #[test]

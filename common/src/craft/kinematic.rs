@@ -7,17 +7,21 @@ use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use super::{Craft, Observation};
+use super::{Craft, Limits, Observation, SATURATED, Warning};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::line_of_sight::LineOfSight;
 use crate::following::proposition_3_1::Errors;
+use crate::path::geometry::wrap_angle;
 use crate::path::shape::is_straight;
 use crate::path::{Path, PathPoint};
 use crate::positive::finite;
+use crate::vehicle::environment::Conditions;
 use crate::vehicle::integrate::advance;
 use crate::vehicle::kinematic_unicycle::{Input, model};
 
 /// A kinematic unicycle that follows a straight line at sight and moves at the rate it is asked for.
+///
+/// It turns and moves as its instruments tell it: their errors make it miss the commanded heading and speed.
 #[derive(Debug)]
 pub struct KinematicCraft {
     path: Arc<dyn Path>,
@@ -25,8 +29,13 @@ pub struct KinematicCraft {
     /// The point of the line at its ξ = 0.
     origin: PathPoint,
     position: Vector2<f64>,
+    /// What is commanded, and what is done.
+    wanted: Input,
     held: Input,
     v_ref: f64,
+    limits: Limits,
+    conditions: Conditions,
+    saturated: u64,
 }
 
 impl KinematicCraft {
@@ -41,12 +50,64 @@ impl KinematicCraft {
         }
         let position = Vector2::new(finite("the position", x)?, finite("the position", y)?);
         let held = Input { speed: 0.0, heading: origin.heading() };
-        Ok(KinematicCraft { path, law, origin, position, held, v_ref: 0.0 })
+        let (limits, conditions) = (Limits::NONE, Conditions::default());
+        Ok(KinematicCraft {
+            path,
+            law,
+            origin,
+            position,
+            wanted: held,
+            held,
+            v_ref: 0.0,
+            limits,
+            conditions,
+            saturated: 0,
+        })
     }
 
-    /// ξ of the projection on the line: (p − p(0))ᵀ t / R.
-    fn xi(&self) -> f64 {
-        (self.position - self.origin.p.xy()).dot(&self.origin.planar_tangent()) / self.origin.r()
+    /// The craft with an acceleration and a turning rate that it cannot exceed, which makes a state of its speed
+    /// \[m/s\] and its heading \[rad\]: it starts with these. Force and torque are nothing that it knows of.
+    pub fn limited(mut self, limits: Limits, speed: f64, heading: f64) -> KinematicCraft {
+        self.limits = limits;
+        if self.is_limited() {
+            self.held = Input { speed, heading };
+            self.wanted = self.held;
+        }
+        self
+    }
+
+    fn is_limited(&self) -> bool {
+        self.limits.acceleration.is_finite() || self.limits.turn_rate.is_finite()
+    }
+
+    /// Where it is as far as it knows.
+    fn measured(&self) -> Vector2<f64> {
+        self.conditions.errors.map_or(self.position, |errors| self.position + errors.position.xy())
+    }
+
+    /// Does at once what can be done at once.
+    fn settle(&mut self) {
+        if !self.is_limited() {
+            self.held = self.wanted;
+        }
+        if let Some(speed) = self.conditions.stuck_speed {
+            self.held.speed = speed;
+        }
+    }
+
+    /// Comes as close to what is commanded as the limits allow in `dt` seconds; the shorter way round.
+    fn slew(&mut self, dt: f64) {
+        let Limits { acceleration, turn_rate, .. } = self.limits;
+        let turn = wrap_angle(self.wanted.heading - self.held.heading);
+        self.held.heading += turn.clamp(-turn_rate * dt, turn_rate * dt);
+        if self.conditions.stuck_speed.is_none() {
+            self.held.speed += (self.wanted.speed - self.held.speed).clamp(-acceleration * dt, acceleration * dt);
+        }
+    }
+
+    /// ξ of the projection of a position on the line: (p − p(0))ᵀ t / R.
+    fn xi(&self, position: Vector2<f64>) -> f64 {
+        (position - self.origin.p.xy()).dot(&self.origin.planar_tangent()) / self.origin.r()
     }
 
     /// ξ̇ = v cos ψ / R, which is (v + d)/R.
@@ -54,8 +115,8 @@ impl KinematicCraft {
         self.held.speed * (self.held.heading - self.origin.heading()).cos() / self.origin.r()
     }
 
-    fn errors(&self) -> Errors {
-        Errors::of(&self.path.at(self.xi()), self.position.x, self.position.y, self.held.heading)
+    fn errors(&self, position: Vector2<f64>) -> Errors {
+        Errors::of(&self.path.at(self.xi(position)), position.x, position.y, self.held.heading)
     }
 }
 
@@ -64,27 +125,49 @@ impl Craft for KinematicCraft {
         DemandKind::Rate
     }
 
+    fn expose(&mut self, conditions: &Conditions) {
+        self.conditions = *conditions;
+        self.settle();
+    }
+
     fn own(&self, _: SpeedReference) -> Own {
-        Own { xi: self.xi(), eta: 0.0, r: self.origin.r(), ..Own::default() }
+        Own { xi: self.xi(self.measured()), eta: 0.0, r: self.origin.r(), ..Own::default() }
     }
 
     /// v = R v_r, and the heading of (1.4).
     fn command(&mut self, _: SpeedReference, demand: Demand) {
         let Demand::Rate(v_r) = demand else { return };
         let speed = self.origin.r() * v_r;
-        let heading = self.origin.heading() + self.law.heading(self.errors().y_e, speed);
-        self.held = Input { speed, heading };
+        let heading = self.origin.heading() + self.law.heading(self.errors(self.measured()).y_e, speed);
+        self.wanted = match self.conditions.errors {
+            Some(errors) => Input { speed: speed - errors.velocity.x, heading: heading - errors.heading },
+            None => Input { speed, heading },
+        };
         self.v_ref = v_r;
+        self.settle();
     }
 
     fn advance(&mut self, dt: f64, substeps: usize) {
-        self.position = advance(model, &self.position, &self.held, &(), dt, substeps);
+        if self.is_limited() {
+            let steps = substeps.max(1);
+            for _ in 0..steps {
+                self.slew(dt / steps as f64);
+                self.position = advance(model, &self.position, &self.held, &(), dt / steps as f64, 1);
+            }
+            let missed = self.conditions.stuck_speed.is_none() && self.held.speed != self.wanted.speed;
+            self.saturated += u64::from(missed || wrap_angle(self.wanted.heading - self.held.heading) != 0.0);
+        } else {
+            self.position = advance(model, &self.position, &self.held, &(), dt, substeps);
+        }
+        if let Some(drift) = self.conditions.drift(dt) {
+            self.position += drift.xy();
+        }
     }
 
     fn observe(&self) -> Observation {
-        let e = self.errors();
+        let e = self.errors(self.position);
         Observation {
-            xi: self.xi(),
+            xi: self.xi(self.position),
             xi_rate: self.xi_rate(),
             v_ref: self.v_ref,
             position: [self.position.x, self.position.y, self.origin.p.z],
@@ -104,6 +187,10 @@ impl Craft for KinematicCraft {
     fn is_sound(&self) -> bool {
         self.position.iter().all(|x| x.is_finite()) && self.held.speed.is_finite() && self.held.heading.is_finite()
     }
+
+    fn warnings(&self) -> Vec<Warning> {
+        vec![Warning { what: SATURATED, count: self.saturated }]
+    }
 }
 
 #[cfg(test)]
@@ -117,10 +204,11 @@ mod tests {
     use super::KinematicCraft;
     use crate::coordination::introduction_1_5::Introduction;
     use crate::coordination::{CoordinationLaw, Demand, Neighbour, SpeedReference};
-    use crate::craft::Craft;
+    use crate::craft::{Craft, Limits};
     use crate::following::line_of_sight::LineOfSight;
     use crate::path::circle::{Circle, Turn};
     use crate::path::line::Line;
+    use crate::vehicle::environment::{Conditions, InstrumentErrors};
 
     const REFERENCE: SpeedReference = SpeedReference { v_l: 0.5, v_l_dot: 0.0 };
 
@@ -186,6 +274,72 @@ mod tests {
         }
         let seen = craft.observe();
         assert!(seen.e_cross.abs() < 1e-3 && seen.xi < -10.0, "{seen:?}");
+    }
+
+    fn exposed(craft: &mut KinematicCraft, conditions: Conditions, periods: usize) {
+        for _ in 0..periods {
+            craft.expose(&conditions);
+            craft.command(REFERENCE, Demand::Rate(0.5));
+            craft.advance(0.02, 1);
+        }
+    }
+
+    #[test]
+    fn a_current_across_the_line_leaves_the_distance_at_which_the_approach_holds_against_it() {
+        // v sin ψ + c = 0 with (1.4): y = Δ tan(π c/(2 v)).
+        let mut craft = craft(Line::new(Vector3::zeros(), 0.0, 1.0).unwrap(), 0.0, -1.0);
+        let conditions = Conditions { current: Some(Vector3::new(0.1, 0.2, 0.0)), ..Conditions::default() };
+        exposed(&mut craft, conditions, 5000);
+        let (seen, expected) = (craft.observe(), (PI * 0.2).tan());
+        assert!((seen.e_cross - expected).abs() < 1e-9, "{seen:?}");
+        // Along the line it goes with the water, over the ground.
+        let before = seen.xi;
+        exposed(&mut craft, conditions, 50);
+        assert!((craft.observe().xi - before - (0.5 * 0.84f64.sqrt() + 0.1)).abs() < 1e-9);
+        assert_eq!(craft.observe().speed, 0.5);
+    }
+
+    #[test]
+    fn a_stuck_vehicle_moves_at_its_own_speed_until_the_failure_is_over() {
+        let mut craft = craft(Line::new(Vector3::zeros(), 0.0, 1.0).unwrap(), 0.0, 0.0);
+        exposed(&mut craft, Conditions { stuck_speed: Some(0.3), ..Conditions::default() }, 50);
+        assert!((craft.observe().xi - 0.3).abs() < 1e-12 && craft.observe().speed == 0.3);
+        exposed(&mut craft, Conditions::default(), 50);
+        assert!((craft.observe().xi - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn errors_of_the_instruments_reach_the_law_and_not_the_record() {
+        let mut craft = craft(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap(), 1.0, 0.5);
+        let before = craft.observe();
+        let errors = InstrumentErrors { position: Vector3::new(0.4, 0.5, 0.0), heading: 0.1, ..Default::default() };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        assert_eq!(craft.observe(), before);
+        assert!((craft.own(REFERENCE).xi - 0.7).abs() < 1e-15);
+        craft.command(REFERENCE, Demand::Rate(0.5));
+        // It thinks that it is at y = 1 m, where the approach is at 30 degrees, and that its compass is right.
+        assert!((craft.observe().psi_e - (-PI / 6.0 - 0.1)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn limits_make_the_heading_and_the_speed_take_their_time() {
+        let line = || Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
+        let limits = Limits { acceleration: 0.1, turn_rate: 0.5, ..Limits::NONE };
+        let mut slow = craft(line(), 0.0, 0.0).limited(limits, 0.0, PI - 0.1);
+        exposed(&mut slow, Conditions::default(), 50);
+        // A second later, the shorter way round: to the right.
+        let seen = slow.observe();
+        assert!((seen.speed - 0.1).abs() < 1e-12 && (seen.attitude[0] - (PI - 0.6)).abs() < 1e-12, "{seen:?}");
+        assert_eq!(slow.warnings()[0].count, 50);
+        exposed(&mut slow, Conditions::default(), 6000);
+        assert!(slow.observe().e_cross.abs() < 1e-3 && (slow.observe().speed - 0.5).abs() < 1e-12);
+        assert!(slow.warnings()[0].count < 1000);
+        // Limits that are never met change nothing.
+        let wide = Limits { acceleration: 1e9, turn_rate: 1e9, ..Limits::NONE };
+        let (mut one, mut two) = (craft(line(), 0.0, 1.0), craft(line(), 0.0, 1.0).limited(wide, 0.0, 0.0));
+        exposed(&mut one, Conditions::default(), 50);
+        exposed(&mut two, Conditions::default(), 50);
+        assert!((one.observe().e_cross - two.observe().e_cross).abs() < 1e-12 && two.warnings()[0].count == 0);
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub mod kinematic;
 pub mod robot;
 
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
+use crate::vehicle::environment::Conditions;
 
 /// What a craft tells for the record; angles in radians, lengths in metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,11 +40,58 @@ pub struct Observation {
     pub psi_e: f64,
 }
 
+/// Something that a flight should not hide: what, and in how many control periods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// What happened.
+    pub what: &'static str,
+    /// In how many control periods.
+    pub count: u64,
+}
+
+/// An actuator was at its limit and gave less than the law asked for.
+pub const SATURATED: &str = "an actuator was at its limit";
+/// The law had no finite answer, or the demand was none: the command before was held.
+pub const REFUSED: &str = "the law had no answer, the command before was held";
+/// A divisor of the law was too close to zero and was limited.
+pub const LIMITED: &str = "the law was close to singular, its divisors were limited";
+
+/// Most actuators have one: the largest effort that they give, either way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Force \[N\], of each direction that is driven; infinite for no limit.
+    pub force: f64,
+    /// Torque \[N m\], about each axis that is driven; infinite for no limit.
+    pub torque: f64,
+    /// Change of speed \[m/s²\] of a vehicle that is commanded a speed; infinite for no limit.
+    pub acceleration: f64,
+    /// Turning rate \[rad/s\] of a vehicle that is commanded a heading; infinite for no limit.
+    pub turn_rate: f64,
+}
+
+impl Limits {
+    /// No limits.
+    pub const NONE: Limits =
+        Limits { force: f64::INFINITY, torque: f64::INFINITY, acceleration: f64::INFINITY, turn_rate: f64::INFINITY };
+}
+
+impl Default for Limits {
+    fn default() -> Limits {
+        Limits::NONE
+    }
+}
+
 /// A vehicle under its path-following law. The law is evaluated in [`command`](Craft::command) at each control
 /// period and its output held while [`advance`](Craft::advance) integrates the plant with RK4.
+///
+/// [`own`](Craft::own) and [`command`](Craft::command) know what the vehicle measures; [`observe`](Craft::observe) tells
+/// what is true.
 pub trait Craft: Send {
     /// The kind of demand it takes.
     fn takes(&self) -> DemandKind;
+    /// Exposes the vehicle to the conditions of the control period that begins, before [`own`](Craft::own); they hold
+    /// until the next ones. A vehicle that is never exposed is in still water with perfect instruments.
+    fn expose(&mut self, conditions: &Conditions);
     /// What its coordination law may know of it; `xi` without the pattern removed.
     fn own(&self, reference: SpeedReference) -> Own;
     /// Evaluates the path-following law and holds its output. A demand of the wrong kind is a programming error
@@ -57,4 +105,8 @@ pub trait Craft: Send {
     fn place_target(&mut self, xi: f64);
     /// True while every state is finite.
     fn is_sound(&self) -> bool;
+    /// What happened so far that a flight should not hide; counts of zero may be left out.
+    fn warnings(&self) -> Vec<Warning> {
+        Vec::new()
+    }
 }

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Craft, Observation};
+use super::{Craft, Limits, Observation, SATURATED, Warning};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::{Bend, Errors, Motion, Proposition31, Sense};
 use crate::path::shape::is_planar;
 use crate::path::{Path, PathPoint};
 use crate::positive::{finite, positive};
 use crate::vehicle::dynamic_unicycle::{Input, Parameters, State, model};
+use crate::vehicle::environment::Conditions;
 use crate::vehicle::integrate::advance;
 
 /// What coordination commands: the mission's choice of law decides.
@@ -41,7 +42,8 @@ impl SpeedLoop {
             (SpeedLoop::Acceleration, Demand::Acceleration(u)) => {
                 Some(Answer { v_dot: u + r_dot * v_l + r * v_l_dot, wanted: r * v_l, v_ref: v_l })
             }
-            (SpeedLoop::Acceleration, Demand::Forward(v_dot)) => Some(Answer { v_dot, wanted: r * v_l, v_ref: v_l }),
+            // The sense of travel of a robot that may not be told v_L is its own.
+            (SpeedLoop::Acceleration, Demand::Forward(v_dot)) => Some(Answer { v_dot, wanted: v, v_ref: v_l }),
             // F/m = d/dt(R v_r) − k₀ (v − R v_r); the derivative of v_r itself is not known and left out.
             (SpeedLoop::Rate { k_0 }, Demand::Rate(v_r)) => {
                 Some(Answer { v_dot: r_dot * v_r - k_0 * (v - r * v_r), wanted: r * v_r, v_ref: v_r })
@@ -79,6 +81,9 @@ pub struct RobotCraft {
     target: PathPoint,
     sense: Sense,
     held: Held,
+    limits: Limits,
+    conditions: Conditions,
+    saturated: u64,
 }
 
 impl RobotCraft {
@@ -103,12 +108,42 @@ impl RobotCraft {
         }
         state.to_vector().iter().try_for_each(|&x| finite("the robot's state", x).map(drop))?;
         let (target, parameters) = (path.at(finite("the robot's xi", xi)?), parameters.checked()?);
-        let (sense, held) = (Sense::default(), Held::default());
-        Ok(RobotCraft { path, law, speed_loop, parameters, state, xi, target, sense, held })
+        Ok(RobotCraft {
+            path,
+            law,
+            speed_loop,
+            parameters,
+            state,
+            xi,
+            target,
+            sense: Sense::default(),
+            held: Held::default(),
+            limits: Limits::NONE,
+            conditions: Conditions::default(),
+            saturated: 0,
+        })
     }
 
-    fn errors(&self) -> Errors {
-        Errors::of(&self.target, self.state.x, self.state.y, self.state.heading)
+    /// The robot with a force and a torque that it cannot exceed.
+    pub fn limited(mut self, limits: Limits) -> RobotCraft {
+        self.limits = limits;
+        self
+    }
+
+    /// Its state as its instruments tell it.
+    fn measured(&self) -> State {
+        let Some(errors) = self.conditions.errors else { return self.state };
+        State {
+            x: self.state.x + errors.position.x,
+            y: self.state.y + errors.position.y,
+            heading: self.state.heading + errors.heading,
+            speed: self.state.speed + errors.velocity.x,
+            turn_rate: self.state.turn_rate + errors.spin.z,
+        }
+    }
+
+    fn errors(&self, state: &State) -> Errors {
+        Errors::of(&self.target, state.x, state.y, state.heading)
     }
 
     fn move_target(&mut self, xi: f64) {
@@ -125,39 +160,60 @@ impl Craft for RobotCraft {
         }
     }
 
-    /// With η = v − R v_L (3.38), or zero for a robot that takes a rate.
-    fn own(&self, reference: SpeedReference) -> Own {
-        let r = self.target.r();
-        let eta = match self.speed_loop {
-            SpeedLoop::Acceleration => self.state.speed - r * reference.v_l,
-            SpeedLoop::Rate { .. } => 0.0,
-        };
-        let xi_rate = self.law.target_speed(&self.errors(), self.state.speed) / r;
-        let r_dot = self.target.dr_dxi() * xi_rate;
-        Own { xi: self.xi, eta, r, v: self.state.speed, r_dot, ..Own::default() }
+    /// The engine keeps its stuck speed at once (section 2.4: v_i = v₀).
+    fn expose(&mut self, conditions: &Conditions) {
+        self.conditions = *conditions;
+        if let Some(speed) = conditions.stuck_speed {
+            self.state.speed = speed;
+        }
     }
 
+    /// With η = v − R v_L (3.38), or zero for a robot that takes a rate.
+    fn own(&self, reference: SpeedReference) -> Own {
+        let (r, state) = (self.target.r(), self.measured());
+        let eta = match self.speed_loop {
+            SpeedLoop::Acceleration => state.speed - r * reference.v_l,
+            SpeedLoop::Rate { .. } => 0.0,
+        };
+        let xi_rate = self.law.target_speed(&self.errors(&state), state.speed) / r;
+        let r_dot = self.target.dr_dxi() * xi_rate;
+        Own { xi: self.xi, eta, r, v: state.speed, r_dot, ..Own::default() }
+    }
+
+    /// Where the force is at its limit, the law knows that it is.
     fn command(&mut self, reference: SpeedReference, demand: Demand) {
-        let (v, e) = (self.state.speed, self.errors());
+        let state = self.measured();
+        let (v, e) = (state.speed, self.errors(&state));
         // ξ̇ = ṡ/R = (v cos ψ_e + k₃ x_e)/R (3.35)
         let xi_rate = self.law.target_speed(&e, v) / self.target.r();
         let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v, xi_rate) else { return };
         self.sense = self.law.sense(self.sense, v, answer.wanted);
-        let motion = Motion { v, v_dot: answer.v_dot, r: self.state.turn_rate };
-        let steering = self.law.steer(&e, &motion, &Bend::of(&self.target), self.sense);
         let Parameters { mass, inertia } = self.parameters;
-        let input = Input { force: mass * answer.v_dot, torque: inertia * steering.r_dot };
+        let (force, cut) = limited(mass * answer.v_dot, self.limits.force);
+        let v_dot = if cut { force / mass } else { answer.v_dot };
+        let motion = Motion { v, v_dot, r: state.turn_rate };
+        let steering = self.law.steer(&e, &motion, &Bend::of(&self.target), self.sense);
+        let (torque, cut_too) = limited(inertia * steering.r_dot, self.limits.torque);
+        self.saturated += u64::from(cut || cut_too);
+        let input = Input { force, torque };
         self.held = Held { input, xi_rate, v_ref: answer.v_ref };
     }
 
     fn advance(&mut self, dt: f64, substeps: usize) {
-        let state = self.state.to_vector();
-        self.state = State::from_vector(advance(model, &state, &self.held.input, &self.parameters, dt, substeps));
+        let (state, mut input) = (self.state.to_vector(), self.held.input);
+        if self.conditions.stuck_speed.is_some() {
+            input.force = 0.0;
+        }
+        self.state = State::from_vector(advance(model, &state, &input, &self.parameters, dt, substeps));
+        if let Some(drift) = self.conditions.drift(dt) {
+            self.state.x += drift.x;
+            self.state.y += drift.y;
+        }
         self.move_target(self.xi + self.held.xi_rate * dt);
     }
 
     fn observe(&self) -> Observation {
-        let e = self.errors();
+        let e = self.errors(&self.state);
         Observation {
             xi: self.xi,
             xi_rate: self.held.xi_rate,
@@ -181,6 +237,15 @@ impl Craft for RobotCraft {
         [self.xi, input.force, input.torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
             && self.state.to_vector().iter().all(|x| x.is_finite())
     }
+
+    fn warnings(&self) -> Vec<Warning> {
+        vec![Warning { what: SATURATED, count: self.saturated }]
+    }
+}
+
+/// An effort within ±`limit`, and whether that took something of it.
+fn limited(effort: f64, limit: f64) -> (f64, bool) {
+    if effort.abs() > limit { (limit.copysign(effort), true) } else { (effort, false) }
 }
 
 #[cfg(test)]
@@ -197,7 +262,7 @@ mod tests {
     use crate::coordination::solution_3_3_45::SolutionThree;
     use crate::coordination::switching_4_21::Switching;
     use crate::coordination::{CoordinationLaw, Demand, DemandKind, Neighbour, SpeedReference};
-    use crate::craft::Craft;
+    use crate::craft::{Craft, Limits};
     use crate::following::proposition_3_1::{Approach, Gains, Proposition31};
     use crate::path::Path;
     use crate::path::chain::{Chain, Segment};
@@ -207,6 +272,7 @@ mod tests {
     use crate::path::line::Line;
     use crate::path::sinusoid::Sinusoid;
     use crate::vehicle::dynamic_unicycle::{Parameters, State};
+    use crate::vehicle::environment::{Conditions, InstrumentErrors};
 
     const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
     const PARAMETERS: Parameters = Parameters { mass: 5.0, inertia: 0.4 };
@@ -411,6 +477,43 @@ mod tests {
         assert!((heavy.held.input.force - 5.0 * unit.held.input.force).abs() < 1e-9);
         assert!((heavy.held.input.torque - 0.4 * unit.held.input.torque).abs() < 1e-9);
         assert!((heavy.observe().e_cross - unit.observe().e_cross).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_force_at_its_limit_is_known_to_the_law_and_counted() {
+        let line = Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
+        let limits = Limits { force: 0.5, torque: 0.01, ..Limits::NONE };
+        let mut craft = robot(line, 0.0, 0.0, 0.0).limited(limits);
+        for _ in 0..50 {
+            craft.command(REFERENCE, Demand::Forward(-3.0));
+            craft.advance(0.02, 1);
+        }
+        // F/m = −0.1 m/s² for a second.
+        assert!((craft.observe().speed + 0.1).abs() < 1e-12);
+        assert_eq!((craft.warnings()[0].count, craft.held.input.force), (50, -0.5));
+        craft.state.heading = 1.0;
+        craft.command(REFERENCE, Demand::Forward(0.0));
+        assert_eq!((craft.held.input.force, craft.held.input.torque), (0.0, -0.01));
+    }
+
+    #[test]
+    fn a_robot_is_carried_along_and_stuck_and_mistaken() {
+        let mut craft = robot(Line::new(Vector3::zeros(), 0.0, 1.0).unwrap(), 0.0, 0.0, 0.0);
+        let errors = InstrumentErrors {
+            position: Vector3::new(0.0, 0.5, 0.0),
+            velocity: Vector3::new(0.05, 0.0, 0.0),
+            ..InstrumentErrors::default()
+        };
+        let (current, stuck_speed) = (Some(Vector3::new(0.0, -0.3, 0.0)), Some(0.25));
+        craft.expose(&Conditions { current, errors: Some(errors), stuck_speed });
+        // The laws see v = 0.3 and a vehicle at the left; the record does not.
+        assert!((craft.own(REFERENCE).eta - 0.2).abs() < 1e-15);
+        assert_eq!((craft.observe().speed, craft.observe().e_cross), (0.25, 0.0));
+        craft.command(REFERENCE, Demand::Acceleration(1.0));
+        assert!(craft.held.input.torque < 0.0, "it turns right");
+        craft.advance(0.02, 1);
+        let seen = craft.observe();
+        assert!((seen.e_cross + 0.006).abs() < 1e-6 && seen.speed == 0.25, "{seen:?}");
     }
 
     #[test]

@@ -270,6 +270,22 @@ impl Theorem47 {
         Evaluation { input, alpha_2, e, phi, z_2, w_d_dot: [w_2d_dot, w_3d_dot], limited: pitch.limited || yaw.limited }
     }
 
+    /// α₂ of (4.46) alone, as [`Theorem47::evaluate`] gives it: it needs the target's nominal rate `v_n` \[1/s\], not the
+    /// actual one, so that coordination can use it to decide that.
+    #[doc(alias = "α_2")]
+    pub fn alpha_2(&self, state: &AuvState, target: &PathPoint, v_n: f64) -> f64 {
+        let k_e = self.gains.k_e;
+        let m = self.auv.parameters().mass;
+        let rotation = state.attitude.to_rotation_matrix();
+        let to_body = |x: &Vector3<f64>| rotation.matrix().tr_mul(x);
+        let (q, q_2) = (to_body(&target.d1), to_body(&target.d2));
+        let e = to_body(&(state.position - target.p));
+        let mut phi = state.velocity - q * v_n + self.auv.inverse_mass().component_mul(&e) * k_e;
+        phi.x -= self.gains.delta1;
+        let h_1 = -(m.component_mul(&q_2) * v_n + q * k_e);
+        alpha_2(&e, &q, &m.component_mul(&phi), &h_1)
+    }
+
     /// (4.49): W₃ = ½ eᵀe + ½ φᵀM²φ + ½ z₂ᵀJz₂.
     #[doc(alias = "W_3")]
     pub fn lyapunov(&self, at: &Evaluation) -> f64 {

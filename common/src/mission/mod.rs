@@ -4,6 +4,7 @@ mod build;
 mod check;
 mod fault;
 pub mod file;
+mod pattern;
 mod shape;
 mod speed;
 
@@ -12,15 +13,17 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 pub use fault::{Fault, Faults};
+pub use pattern::{Pattern, PatternMotion, PatternPoint};
 pub use shape::schema;
 pub use speed::SpeedProfile;
 
 use crate::coordination::FleetLaw;
-use crate::craft::Craft;
+use crate::craft::{Craft, Limits};
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::path::Path;
 use crate::time::{Span, Time};
+use crate::vehicle::environment::{Disturbances, Environment};
 
 /// A mission that can be flown: every number is in its range and everything fits together.
 #[derive(Clone, Debug)]
@@ -70,8 +73,8 @@ pub struct Mission {
 pub struct VehiclePlan {
     /// Its name.
     pub id: String,
-    /// Its place in the pattern, h_i.
-    pub pattern: f64,
+    /// Its place in the pattern, h_i(t).
+    pub pattern: Pattern,
     /// Its path.
     pub path: Arc<dyn Path>,
     /// Where it starts.
@@ -80,6 +83,10 @@ pub struct VehiclePlan {
     pub model: file::ModelChoice,
     /// Its path-following law.
     pub following: file::FollowingChoice,
+    /// What its actuators give at most.
+    pub limits: Limits,
+    /// What disturbs it.
+    pub disturbances: Disturbances,
 }
 
 /// Where a vehicle starts.
@@ -182,6 +189,23 @@ impl Mission {
         }
     }
 
+    /// The rate at which α_2 lets the fleet travel in the end under (4.59), where it is fed back and does not vanish
+    /// (erratum 4.14): v_L less what δ costs, for vehicles with the gains of the first. At rest z = (Lγ + α_2)/(a_1 + a_2), so
+    /// η = −α_2 a_2/(a_1(a_1 + a_2)): that of type I with k_η = a_1(a_1 + a_2)/a_2.
+    pub fn excited_speed(&self) -> Option<f64> {
+        let file::LawChoice::Auxiliary(law) = &self.law_choice else { return None };
+        let plan = self.vehicles.first()?;
+        let (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) =
+            (&plan.model, &plan.following)
+        else {
+            return None;
+        };
+        let mut gains = build::auv_gains(gains);
+        gains.k_eta = law.a1 * (law.a1 + law.a2) / law.a2;
+        let (v_l, stretch) = (self.speed.at(self.end).v_l, plan.path.at(plan.start.xi).r());
+        Some(gains.predicted_rate_type_1(&build::auv(*model), v_l, v_l, stretch))
+    }
+
     /// Whether every vehicle can fly at this formation speed.
     ///
     /// # Errors
@@ -206,6 +230,12 @@ impl Mission {
             scalar: self.law.says().map(|_| 0.0),
         };
         state.encode().len()
+    }
+
+    /// What surrounds a vehicle during its flight; `None` where nothing disturbs it.
+    pub fn environment(&self, vehicle: usize) -> Option<Environment> {
+        let plan = &self.vehicles[vehicle];
+        Environment::new(plan.disturbances, self.seed, &plan.id)
     }
 
     /// The vehicle with its plant and its path-following law, where the mission starts it or at another place.

@@ -7,11 +7,14 @@
 //! | underactuated body in space | sections 4.5, 4.6 | (4.44), (4.45) | [`auv`] |
 //! | its Sirene-like parameters, derived | section 4.6 | – | [`sirene`] |
 //!
+//! What disturbs a plant (currents, noise of its instruments, a speed that is stuck) is in [`environment`].
+//!
 //! Every planar model has its arguments in the order `(t, x, u, params)`; [`integrate`] holds the inputs and integrates.
 
 pub mod attitude;
 pub mod auv;
 pub mod dynamic_unicycle;
+pub mod environment;
 pub mod integrate;
 pub mod kinematic_unicycle;
 pub mod sirene;

@@ -34,6 +34,8 @@ pub enum Garbage {
     Oversized,
     /// Truncated, or with bytes left over, or with an impossible value.
     Malformed,
+    /// Changed on the way: its checksum does not fit.
+    Corrupt,
     /// A number that is not finite.
     NotFinite,
     /// Of another mission.
@@ -47,12 +49,26 @@ pub enum Garbage {
 }
 
 impl Garbage {
+    /// Every kind.
+    pub const ALL: [Garbage; 9] = [
+        Garbage::Foreign,
+        Garbage::Oversized,
+        Garbage::Malformed,
+        Garbage::Corrupt,
+        Garbage::NotFinite,
+        Garbage::WrongMission,
+        Garbage::Forged,
+        Garbage::FromTheFuture,
+        Garbage::Stale,
+    ];
+
     /// In words.
     pub fn as_str(self) -> &'static str {
         match self {
             Garbage::Foreign => "not of this protocol and version",
             Garbage::Oversized => "longer than any message of its kind",
             Garbage::Malformed => "malformed",
+            Garbage::Corrupt => "changed on the way",
             Garbage::NotFinite => "carries a number that is not finite",
             Garbage::WrongMission => "of another mission",
             Garbage::Forged => "names a sender other than the one it came from",
@@ -64,7 +80,7 @@ impl Garbage {
 
 /// How often each kind of garbage came from one source. Bounded: one counter per kind.
 #[derive(Clone, Debug, Default)]
-pub struct GarbageCount([u64; 8]);
+pub struct GarbageCount([u64; Garbage::ALL.len()]);
 
 impl GarbageCount {
     /// Counts one; true the first time, when it deserves a line in the log.

@@ -166,6 +166,7 @@ fn fields(row: &Record) -> Map<String, Value> {
         Record::Message(row) => serde_json::to_value(row),
         Record::Topology(row) => serde_json::to_value(row),
         Record::Speed(row) => serde_json::to_value(row),
+        Record::Warning(row) => serde_json::to_value(row),
     };
     match value {
         Ok(Value::Object(fields)) => fields,
@@ -186,6 +187,7 @@ fn about(row: &Record) -> String {
         Record::Message(row) => format!("message {} {} → {}", row.seq, row.from, row.to),
         Record::Topology(row) => format!("link {} → {}", row.from, row.to),
         Record::Speed(_) => "the formation speed".into(),
+        Record::Warning(row) => format!("a warning of {}", row.source),
     }
 }
 

@@ -60,7 +60,7 @@ impl<W: Write> Exporter<W> {
         Ok(exporter)
     }
 
-    /// Writes one row into its table. The formation speed has none.
+    /// Writes one row into its table. The formation speed and warnings have none.
     pub fn write(&mut self, record: &Record) -> io::Result<()> {
         match record {
             Record::State(row) => {
@@ -92,7 +92,7 @@ impl<W: Write> Exporter<W> {
                 fate(row.fate),
             ))?,
             Record::Topology(row) => self.topology.serialize((seconds(row.t_ns), &row.from, &row.to, row.up))?,
-            Record::Speed(_) => {}
+            Record::Speed(_) | Record::Warning(_) => {}
         }
         Ok(())
     }

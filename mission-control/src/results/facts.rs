@@ -1,5 +1,7 @@
 //! What the caller knows of a mission and the results need: names, patterns, predictions.
 
+use common::mission::Pattern;
+
 /// What is known of a run without looking at its recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
@@ -40,8 +42,8 @@ pub struct Facts {
 pub struct VehicleFacts {
     /// Its name in the recording.
     pub id: String,
-    /// Its place h_i in the pattern: coordination means that ξ_i − h_i is the same for all.
-    pub pattern_offset: f64,
+    /// Its place h_i(t) in the pattern: coordination means that ξ_i − h_i is the same for all.
+    pub pattern: Pattern,
     /// What its path is called.
     pub path: String,
     /// The path as planned \[m\], for the figures; may be empty.

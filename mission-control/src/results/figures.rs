@@ -230,7 +230,7 @@ impl View<'_> {
     /// What the caption has to say about the panel of the coordination errors.
     fn remark(&self) -> String {
         let mut remarks = Vec::new();
-        if self.tracks.iter().any(|track| track.pattern_offset != 0.0) {
+        if self.tracks.iter().any(|track| !track.pattern.is_zero()) {
             remarks.push("the pattern is removed");
         }
         if self.shades_outages() {

@@ -1,6 +1,8 @@
 //! Time series of a fleet, out of the rows of its recording.
 
+use common::mission::Pattern;
 use common::record::{Record, SpeedRow, StateRow};
+use common::time::Time;
 
 use super::Facts;
 use super::statistics::mean;
@@ -11,7 +13,7 @@ pub struct Track<'a> {
     /// Its name.
     pub id: &'a str,
     /// Its place in the pattern.
-    pub pattern_offset: f64,
+    pub pattern: Pattern,
     /// Its states.
     pub rows: Vec<&'a StateRow>,
 }
@@ -21,7 +23,7 @@ pub fn tracks<'a>(exact: &'a [Record], facts: &'a Facts) -> Vec<Track<'a>> {
     let mut tracks: Vec<Track<'a>> = facts
         .vehicles
         .iter()
-        .map(|vehicle| Track { id: &vehicle.id, pattern_offset: vehicle.pattern_offset, rows: Vec::new() })
+        .map(|vehicle| Track { id: &vehicle.id, pattern: vehicle.pattern, rows: Vec::new() })
         .collect();
     let mut guess = 0;
     for record in exact {
@@ -76,7 +78,7 @@ impl Coordination {
             states.clear();
             for (track, cursor) in present.iter().zip(&mut cursors) {
                 let Some(xi) = interpolate(&track.rows, cursor, row.t_ns, gap_ns) else { break };
-                states.push(xi - track.pattern_offset);
+                states.push(xi - track.pattern.at(Time::from_nanos(row.t_ns)).h);
             }
             if states.len() == present.len() {
                 coordination.t_s.push(row.t_ns as f64 / 1e9);
@@ -130,12 +132,14 @@ fn interpolate(rows: &[&StateRow], cursor: &mut usize, t_ns: i64, gap_ns: i64) -
 
 #[cfg(test)]
 mod tests {
+    use common::mission::PatternMotion;
+
     use super::*;
     use crate::results::VehicleFacts;
     use crate::results::testing::state_row;
 
     fn facts() -> Facts {
-        let vehicle = |id: &str, pattern_offset| VehicleFacts { id: id.into(), pattern_offset, ..Default::default() };
+        let vehicle = |id: &str, h| VehicleFacts { id: id.into(), pattern: Pattern::constant(h), ..Default::default() };
         Facts { vehicles: vec![vehicle("a", 0.5), vehicle("b", -0.25)], control_period_s: 0.1, ..Facts::default() }
     }
 
@@ -154,6 +158,24 @@ mod tests {
         assert!(
             coordination.norm().iter().zip([0.0, expected]).all(|(norm, expected)| (norm - expected).abs() < 1e-15)
         );
+    }
+
+    #[test]
+    fn a_pattern_that_moves_is_removed_as_it_is_at_each_instant() {
+        let motion = PatternMotion { amplitude: 0.5, period: 0.4, phase: 0.0 };
+        let moving = Pattern { constant: 1.0, motion: Some(motion) };
+        let vehicle = |id: &str, pattern| VehicleFacts { id: id.into(), pattern, ..Default::default() };
+        let facts = Facts {
+            vehicles: vec![vehicle("a", moving), vehicle("b", Pattern::default())],
+            control_period_s: 0.1,
+            ..Facts::default()
+        };
+        // h is 1, 1.5 and 0.5 at 0, 0.1 and 0.3 s.
+        let rows = [(0, "a", 1.0), (0, "b", 0.0), (100, "a", 1.5), (100, "b", 0.0), (300, "a", 1.5), (300, "b", 0.0)];
+        let exact: Vec<Record> =
+            rows.iter().map(|(ms, id, xi)| Record::State(state_row(ms * 1_000_000, id, *xi))).collect();
+        let spread = Coordination::of(&tracks(&exact, &facts), &facts).spread();
+        assert!(spread.iter().zip([0.0, 0.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{spread:?}");
     }
 
     #[test]

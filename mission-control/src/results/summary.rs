@@ -1,7 +1,8 @@
 //! The numbers of a run: `summary.json`, a function of mission and seed, and `clock.json`, of the machine too.
 
 use bus::recording::Recording;
-use common::record::ClockRecord;
+use common::record::{ClockRecord, Record, StateRow};
+use common::time::Time;
 use serde::Serialize;
 
 use super::Facts;
@@ -134,7 +135,7 @@ pub struct VehicleSummary {
     pub id: String,
     /// Its path.
     pub path: String,
-    /// Its place in the pattern.
+    /// Its place in the pattern; its mean, if it moves.
     pub pattern_offset: f64,
     /// Rows of its state.
     pub rows: u64,
@@ -330,18 +331,21 @@ fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts) -> VehicleSummar
     let peak = largest(errors.iter().copied());
     let path_settled_s = settling_time(&t_s, &errors, SETTLED_PART * peak);
     let settled_index = path_settled_s.map_or(steady_index, |settled| t_s.partition_point(|time| *time < settled));
-    let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - track.pattern_offset);
+    let h = |track: &Track<'_>, row: &StateRow| track.pattern.at(Time::from_nanos(row.t_ns)).h;
+    let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - h(track, row));
     let first = all.iter().find_map(removed);
     let planned = facts.vehicles.iter().find(|vehicle| vehicle.id == track.id);
     VehicleSummary {
         id: track.id.to_owned(),
         path: planned.map(|vehicle| vehicle.path.clone()).unwrap_or_default(),
-        pattern_offset: track.pattern_offset,
+        pattern_offset: track.pattern.constant,
         rows: rows.len() as u64,
         coordination_final: removed(track).zip(first).map_or(0.0, |(own, first)| own - first),
         steady_speed: match (steady.first(), steady.last()) {
-            // The mean rate exactly, not the mean of samples of the rate.
-            (Some(a), Some(b)) if b.t_ns > a.t_ns => (b.xi - a.xi) / ((b.t_ns - a.t_ns) as f64 / 1e9),
+            // The mean rate of ξ − h exactly, not the mean of samples of the rate.
+            (Some(a), Some(b)) if b.t_ns > a.t_ns => {
+                (b.xi - a.xi - (h(track, b) - h(track, a))) / ((b.t_ns - a.t_ns) as f64 / 1e9)
+            }
             _ => rows.last().map_or(0.0, |row| row.xi_rate),
         },
         steady_speed_mps: mean(steady.iter().map(|row| row.speed_mps)),
@@ -399,6 +403,16 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
             link.from, link.to, link.missing, link.repeated
         ));
     }
+    let told = recording.exact.iter().filter_map(|record| match record {
+        Record::Warning(row) => Some(row),
+        _ => None,
+    });
+    let mut told: Vec<_> = told.collect();
+    told.sort_by_key(|row| (row.t_ns, &row.source, &row.text));
+    for row in told {
+        let periods = if row.count == 1 { "period" } else { "periods" };
+        warnings.push(format!("{}: {}, in {} control {periods}.", row.source, row.text, row.count));
+    }
     warnings
 }
 
@@ -414,7 +428,7 @@ pub(super) fn thinned(count: usize, samples: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::results::testing::{facts, fleet};
-    use common::record::Record;
+    use common::record::NoteRow;
 
     #[test]
     fn the_fleet_is_summarised() {
@@ -463,6 +477,17 @@ mod tests {
         assert_eq!(clock.deadlines.iter().map(|deadlines| deadlines.missed).sum::<u64>(), 6);
         assert_eq!(clock.notes.len(), 1);
         assert_eq!(summarise_clock(&without), ClockSummary { format: 1, ..ClockSummary::default() });
+    }
+
+    #[test]
+    fn warnings_of_the_vehicles_reach_the_summary() {
+        let mut recording = fleet(false);
+        let row = |count| NoteRow { t_ns: 9, source: "v2".into(), text: "an actuator was at its limit".into(), count };
+        recording.exact.extend([Record::Warning(row(1)), Record::Warning(row(40))]);
+        let warnings = summarise(&recording, &facts(false)).warnings;
+        let expected =
+            ["1 control period.", "40 control periods."].map(|n| format!("v2: an actuator was at its limit, in {n}"));
+        assert_eq!(warnings, expected);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! A plausible fleet for tests and pictures: three vehicles on helices with decaying errors and outages.
 
 use bus::recording::Recording;
+use common::mission::Pattern;
 use common::record::{
     AchievedRow, ClockRecord, Fate, MessageRow, NoteRow, Record, SpeedRow, StateRow, TicksRow, TopologyRow,
 };
@@ -35,7 +36,7 @@ pub(super) const LINKS: [(&str, &str); 4] = [("v1", "v2"), ("v2", "v1"), ("v2", 
 pub(super) fn facts(spatial: bool) -> Facts {
     let vehicles = (0..3).map(|index| VehicleFacts {
         id: format!("v{}", index + 1),
-        pattern_offset: 0.0,
+        pattern: Pattern::default(),
         path: if spatial { format!("helix-{}", index + 1) } else { format!("circle-{}", index + 1) },
         planned: (0..=200).map(|step| path(f64::from(step) * 2.0, index, spatial)).collect(),
     });

@@ -99,10 +99,7 @@ fn loss_rate(mission: &Mission, network: &Network) -> Option<Figure> {
             ),
             x: "α".into(),
             y: "rate [1/s]".into(),
-            curves: vec![
-                Curve::line("(1 − α) k_m λ_m", promised),
-                Curve::dots("this mission", vec![here]),
-            ],
+            curves: vec![Curve::line("(1 − α) k_m λ_m", promised), Curve::dots("this mission", vec![here])],
         }
         .draw(),
     )

@@ -92,7 +92,11 @@ pub(super) fn connected_in_mean(case: &Case<'_>) -> TheoryRow {
 pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
     let mission = case.mission;
     let v_l = mission.speed.at(mission.end).v_l;
+    let excited = mission.excited_speed();
     let (name, condition, value) = match mission.law_delay() {
+        _ if excited.is_some() => {
+            ("Fleet speed left by δ under (4.59) (erratum 4.14)", "α₂ at rest".to_string(), format!("v_L = {v_l:.4}"))
+        }
         Some(tau) => (
             "Fleet speed v_L* = v_L/(1 + kτ) (after Lemma 4.4)",
             format!("every message τ = {tau} s late"),
@@ -105,7 +109,7 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
         condition,
         value,
         holds: mission.law_delay().map(|tau| mission.links.iter().all(|link| told_truly(link.delay, tau))),
-        predicted: format!("{:.5} 1/s", mission.nominal_factor() * v_l),
+        predicted: format!("{:.5} 1/s", excited.unwrap_or(mission.nominal_factor() * v_l)),
         measured: case.measured(|s| format!("{:.5} 1/s", s.fleet.steady_speed)),
         ..TheoryRow::default()
     }

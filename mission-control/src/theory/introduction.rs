@@ -1,6 +1,6 @@
 //! Two vehicles on lines, (1.5).
 
-use common::mission::file::GainOnly;
+use common::mission::file::{GainOnly, LeaderIntegral};
 
 use super::{Case, Guarantee};
 use crate::results::TheoryRow;
@@ -26,6 +26,20 @@ pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
         holds: Some(case.network.immediate && guarantee.is_some()),
         predicted: guarantee.map_or("–".into(), |g| format!("{:.5} 1/s on the paths", g.rate)),
         guaranteed_rate: guarantee.map(|g| g.rate),
+        measured: case.fitted_rate(),
+    }]
+}
+
+/// The law after (1.5) in which one vehicle learns v_L: s² + 2a s + b.
+pub(super) fn rows_of_a_leader(case: &Case<'_>, law: &LeaderIntegral) -> Vec<TheoryRow> {
+    let rate = law.a - (law.a * law.a - law.b).max(0.0).sqrt();
+    vec![TheoryRow {
+        name: "One vehicle learns v_L (section 1.2, after (1.5))".into(),
+        condition: "fixed two-way link, no delay, no loss, v_L constant".into(),
+        value: if case.network.is_fixed() { "fixed".into() } else { "changes, delays or loses".into() },
+        holds: Some(case.network.is_fixed() && case.network.graph.is_undirected()),
+        guaranteed_rate: Some(rate).filter(|_| case.network.is_fixed() && case.network.graph.is_undirected()),
+        predicted: format!("{rate:.5} 1/s on the paths"),
         measured: case.fitted_rate(),
     }]
 }

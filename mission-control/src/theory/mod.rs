@@ -9,6 +9,8 @@
 //! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
 //! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
 //! | solutions I to III | Propositions 3.4, 3.5 | `solutions.rs` |
+//! | one-way links, one told vehicle | Propositions 3.6, 3.7, Remark 3.13 | `directed.rs` |
+//! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
 //! | switching networks | Theorems 4.4, 4.5 | `switching.rs` |
 //! | late information | Lemmas 4.4, 4.5 | `delayed.rs` |
 //! | the run as flown, or so far | Theorems 4.4, 4.5, Lemmas 4.4–4.7 | `watched.rs` |
@@ -16,7 +18,9 @@
 //!
 //! The mathematics is in `common::theory`; here is only which statement speaks of which mission, and in which words.
 
+mod auxiliary;
 mod delayed;
+mod directed;
 mod figures;
 mod fleet;
 mod introduction;
@@ -94,6 +98,7 @@ fn guarantee_of(case: &Case<'_>) -> Option<Guarantee> {
     match &case.mission.law_choice {
         LawChoice::Introduction(law) => introduction::guarantee(case, law),
         LawChoice::Switching(law) => switching::guarantee(case, law),
+        LawChoice::AuxiliarySwitching(law) => auxiliary::guarantee(case, law),
         _ => None,
     }
 }
@@ -118,9 +123,19 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
 fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
     match &case.mission.law_choice {
         LawChoice::Introduction(law) => introduction::rows(case, law),
+        LawChoice::LeaderIntegral(law) => introduction::rows_of_a_leader(case, law),
         LawChoice::Solution1(law) => solutions::rows(case, Law::SolutionOne { a: law.a }),
+        LawChoice::Solution2(law) if !case.network.graph.is_undirected() => {
+            directed::rows_of_solution_2(case, law.a, law.b)
+        }
         LawChoice::Solution2(law) => solutions::rows(case, Law::SolutionTwo { a: law.a, b: law.b }),
         LawChoice::Solution3(law) => solutions::rows(case, Law::SolutionThree { a: law.a, b: law.b }),
+        LawChoice::Weighted(_) => solutions::rows_with_weights(case),
+        LawChoice::MovingPattern(_) => solutions::rows_of_a_moving_pattern(case),
+        LawChoice::Directed(law) => directed::rows(case, law.a, law.b),
+        LawChoice::TrulyDecentralised(law) => directed::rows_of_a_told_vehicle(case, law),
+        LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
+        LawChoice::AuxiliarySwitching(law) => auxiliary::rows_switching(case, law),
         LawChoice::Switching(law) => switching::rows(case, law),
         LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),
     }

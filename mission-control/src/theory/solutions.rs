@@ -1,10 +1,10 @@
 //! Solutions I to III of section 3.3: fixed networks, paths whose R_i may vary.
 
-use common::mission::Mission;
+use common::mission::{Mission, VehiclePlan};
 use common::theory::linear_coordination::Law;
 use common::theory::proposition_3_4::{self, PathRates};
-use common::theory::proposition_3_6::DirectedLaw;
 use common::theory::proposition_3_8;
+use common::time::Time;
 
 use super::Case;
 use crate::results::TheoryRow;
@@ -12,13 +12,17 @@ use crate::results::TheoryRow;
 /// Places along the way at which R_i is looked at.
 const PLACES: u32 = 400;
 
-/// R_i of every vehicle at places along the way of this mission \[m per unit of ξ\].
+/// R_i of every vehicle while the fleet goes its way in formation \[m per unit of ξ\], at instants of the mission.
 pub(super) fn path_rates(mission: &Mission) -> Vec<Vec<f64>> {
-    let start = mission.vehicles.iter().map(|vehicle| vehicle.start.xi - vehicle.pattern).fold(f64::INFINITY, f64::min);
-    let way = mission.speed.distance(mission.end);
+    let behind = |vehicle: &VehiclePlan| vehicle.start.xi - vehicle.pattern.at(Time::ZERO).h;
+    let start = mission.vehicles.iter().map(behind).fold(f64::INFINITY, f64::min);
+    let instant = |place: u32| Time::from_secs(mission.end.secs() * f64::from(place) / f64::from(PLACES));
     (0..=PLACES)
-        .map(|place| start + way * f64::from(place) / f64::from(PLACES))
-        .map(|xi| mission.vehicles.iter().map(|vehicle| vehicle.path.at(xi + vehicle.pattern).r()).collect())
+        .map(instant)
+        .map(|t| {
+            let xi = start + mission.speed.distance(t);
+            mission.vehicles.iter().map(|vehicle| vehicle.path.at(xi + vehicle.pattern.at(t).h).r()).collect()
+        })
         .collect()
 }
 
@@ -36,21 +40,7 @@ pub(super) fn summary_of(places: &[Vec<f64>]) -> PathRates {
 pub(super) fn rows(case: &Case<'_>, law: Law) -> Vec<TheoryRow> {
     let graph = &case.network.graph;
     let places = path_rates(case.mission);
-    let paths = summary_of(&places);
-    let fixed = case.network.is_fixed();
-    let mut rows = Vec::new();
-    let directed = match (law, &paths) {
-        // One-way links are covered by Remark 3.13 if all R_i are the same number.
-        (Law::SolutionTwo { a, b }, PathRates::Constant(r)) if !graph.is_undirected() => r
-            .iter()
-            .all(|r| (r - r_1(&paths)).abs() <= 1e-9 * r)
-            .then(|| (DirectedLaw::TimesC(1.0 / r_1(&paths)), a, b)),
-        _ => None,
-    };
-    rows.push(match directed {
-        Some((directed, a, b)) => case.row(directed.verdict(graph, false, a, b, fixed)),
-        None => case.row(proposition_3_4::verdict(law, graph, &paths, fixed)),
-    });
+    let mut rows = vec![case.row(proposition_3_4::verdict(law, graph, &summary_of(&places), case.network.is_fixed()))];
     if let Law::SolutionThree { a, .. } = law {
         let bounded = proposition_3_8::verdict(graph, &vec![a; graph.len()], &places);
         rows.push(TheoryRow {
@@ -62,9 +52,40 @@ pub(super) fn rows(case: &Case<'_>, law: Law) -> Vec<TheoryRow> {
     rows
 }
 
-fn r_1(paths: &PathRates) -> f64 {
-    match paths {
-        PathRates::Constant(r) => r[0],
-        PathRates::AtMost(r) => *r,
+/// Solution II with weighted links (3.62), for constant C.
+pub(super) fn rows_with_weights(case: &Case<'_>) -> Vec<TheoryRow> {
+    let constant = matches!(summary_of(&path_rates(case.mission)), PathRates::Constant(_));
+    let row = agreement(case, "Proposition 3.4 with weights (Remark 3.10)");
+    let varying = if constant { "" } else { ", R_i varies" };
+    vec![TheoryRow {
+        condition: format!("{}, R_i constant", row.condition),
+        value: format!("{}{varying}", row.value),
+        holds: row.holds.map(|holds| holds && constant),
+        ..row
+    }]
+}
+
+/// Solution III about a pattern that moves (3.70).
+pub(super) fn rows_of_a_moving_pattern(case: &Case<'_>) -> Vec<TheoryRow> {
+    vec![agreement(case, "Proposition 3.5 about a moving pattern (section 3.3.3)")]
+}
+
+/// The row of a proposition that promises agreement on a fixed two-way network, and no rate.
+fn agreement(case: &Case<'_>, name: &'static str) -> TheoryRow {
+    let (graph, fixed) = (&case.network.graph, case.network.is_fixed());
+    let holds = fixed && graph.is_undirected() && graph.is_connected();
+    TheoryRow {
+        name: name.into(),
+        condition: "fixed two-way connected network, no delay, no loss".into(),
+        value: format!(
+            "{}, {}, {}",
+            if graph.is_undirected() { "two-way" } else { "one-way links" },
+            if graph.is_connected() { "connected" } else { "not connected" },
+            if fixed { "fixed" } else { "changes, delays or loses" }
+        ),
+        holds: Some(holds),
+        predicted: if holds { "agreement, no rate".into() } else { "–".into() },
+        measured: case.fitted_rate(),
+        ..TheoryRow::default()
     }
 }

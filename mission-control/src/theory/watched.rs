@@ -18,6 +18,9 @@ fn watched(mission: &Mission, network: &Network) -> Option<Watched> {
         LawChoice::Switching(law) if network.immediate && moves_as_told(mission) => {
             Some(Watched::Agreement(vec![law.gain; n]))
         }
+        LawChoice::AuxiliarySwitching(law) if network.immediate && moves_as_told(mission) => {
+            Some(Watched::Dynamic(law.a1, law.a2))
+        }
         LawChoice::DelayedWithLosses(_) => Some(Watched::Delayed),
         LawChoice::Delayed(_) if network.leaves_nobody_alone() => Some(Watched::Delayed),
         _ => None,

@@ -7,15 +7,15 @@ use super::super::file::{
 };
 use super::super::{Start, VehiclePlan};
 use crate::coordination::DemandKind;
-use crate::craft::Craft;
 use crate::craft::auv::AuvCraft;
 use crate::craft::kinematic::KinematicCraft;
 use crate::craft::robot::{RobotCraft, SpeedLoop};
+use crate::craft::{Craft, Limits};
 use crate::following::line_of_sight::LineOfSight;
 use crate::following::proposition_3_1::{Approach, Gains as RobotGains, Proposition31};
 use crate::following::theorem_4_7::{Gains as AuvGains, TargetMotion, Theorem47};
 use crate::path::Path;
-use crate::vehicle::auv::{Auv, AuvState};
+use crate::vehicle::auv::{Auv, AuvParameters, AuvState};
 use crate::vehicle::dynamic_unicycle::{Parameters, State};
 use crate::vehicle::sirene::sirene;
 
@@ -31,7 +31,8 @@ pub(in crate::mission) fn craft(
         (ModelChoice::KinematicUnicycle, FollowingChoice::LineOfSight(law)) => {
             let law = LineOfSight::new(law.distance_m)?;
             let [x, y, _] = start.position;
-            Ok(Box::new(KinematicCraft::new(plan.path.clone(), law, x, y)?))
+            let craft = KinematicCraft::new(plan.path.clone(), law, x, y)?;
+            Ok(Box::new(craft.limited(plan.limits, start.speed, start.yaw)))
         }
         (ModelChoice::DynamicUnicycle(body), FollowingChoice::Proposition31(gains)) => {
             let parameters = Parameters { mass: body.mass_kg, inertia: body.inertia_kgm2 }.checked()?;
@@ -42,10 +43,11 @@ pub(in crate::mission) fn craft(
                 DemandKind::Acceleration => SpeedLoop::Acceleration,
                 DemandKind::Rate => SpeedLoop::Rate { k_0: gains.k_speed },
             };
-            Ok(Box::new(RobotCraft::new(plan.path.clone(), law, speed_loop, parameters, state, start.xi)?))
+            let craft = RobotCraft::new(plan.path.clone(), law, speed_loop, parameters, state, start.xi)?;
+            Ok(Box::new(craft.limited(plan.limits)))
         }
         (ModelChoice::UnderactuatedAuv(model), FollowingChoice::Theorem47(gains)) => {
-            let auv = auv(*model);
+            let auv = limited(auv(*model), &plan.limits)?;
             let motion = match gains.kind {
                 FollowingType::I => TargetMotion::TypeI,
                 FollowingType::II => TargetMotion::TypeII,
@@ -82,6 +84,16 @@ pub(in crate::mission) fn auv(model: AuvModel) -> Auv {
     match model {
         AuvModel::Sirene => sirene(),
     }
+}
+
+/// The rigid body with the tighter of its own limits and these, which are in newtons.
+fn limited(auv: Auv, limits: &Limits) -> Result<Auv, String> {
+    let own = *auv.parameters();
+    Auv::new(AuvParameters {
+        thrust_limit: own.thrust_limit.min(limits.force / 1e3),
+        torque_limit: own.torque_limit.min(limits.torque / 1e3),
+        ..own
+    })
 }
 
 /// The largest |p'| over the range in which a path is used.

@@ -2,28 +2,52 @@
 
 use std::sync::Arc;
 
-use super::super::file::LawChoice;
+use super::super::file::{Laplacian, LawChoice, LinkWeight};
 use crate::coordination::FleetLaw;
+use crate::coordination::auxiliary_4_59::Auxiliary;
+use crate::coordination::decentralised_3_92::{Decentralised, Weighing};
 use crate::coordination::delayed_4_34::Delayed;
 use crate::coordination::delayed_4_42::DelayedAlone;
+use crate::coordination::directed_3_72::Directed;
 use crate::coordination::introduction_1_5::Introduction;
+use crate::coordination::leader_1_5::LeaderIntegral;
+use crate::coordination::pattern_3_70::MovingPattern;
 use crate::coordination::solution_1_3_43::SolutionOne;
 use crate::coordination::solution_2_3_44::SolutionTwo;
 use crate::coordination::solution_3_3_45::SolutionThree;
 use crate::coordination::switching_4_21::Switching;
+use crate::coordination::weighted_3_62::Weighted;
 use crate::theory::delay::steady_speed;
 use crate::time::Span;
 
-/// The coordination law of a choice.
-pub(in crate::mission) fn law(choice: &LawChoice) -> Result<Arc<dyn FleetLaw>, String> {
+/// The coordination law of a choice, for vehicles with these ids.
+pub(in crate::mission) fn law(choice: &LawChoice, ids: &[&str]) -> Result<Arc<dyn FleetLaw>, String> {
+    let index = |id: &str| ids.iter().position(|other| *other == id).ok_or(format!("{id:?}, which is no vehicle"));
     Ok(match choice {
         LawChoice::Introduction(g) => Arc::new(Introduction::new(g.gain)?),
+        LawChoice::LeaderIntegral(g) => Arc::new(LeaderIntegral::new(index(&g.leader)?, g.a, g.b)?),
         LawChoice::Solution1(g) => Arc::new(SolutionOne::new(g.a)?),
         LawChoice::Solution2(g) => Arc::new(SolutionTwo::new(g.a, g.b)?),
         LawChoice::Solution3(g) => Arc::new(SolutionThree::new(g.a, g.b, g.x_m)?),
+        LawChoice::Weighted(g) => {
+            let weight = |w: &LinkWeight| Ok((index(&w.link[0])?, index(&w.link[1])?, w.weight));
+            let weights = g.weights.iter().map(weight).collect::<Result<Vec<_>, String>>()?;
+            Arc::new(Weighted::new(g.a, g.b, ids.len(), &weights)?)
+        }
+        LawChoice::MovingPattern(g) => Arc::new(MovingPattern::new(g.a, g.b, g.x_m)?),
+        LawChoice::Directed(g) => Arc::new(Directed::new(g.a, g.b)?),
+        LawChoice::TrulyDecentralised(g) => {
+            let weighing = match g.laplacian {
+                Laplacian::Plain => Weighing::Plain,
+                Laplacian::Normalised => Weighing::Normalised,
+            };
+            Arc::new(Decentralised::new(index(&g.told)?, g.a, g.b, weighing)?)
+        }
         LawChoice::Switching(g) => Arc::new(Switching::new(g.gain)?),
         LawChoice::Delayed(g) => Arc::new(Delayed::new(g.gain)?),
         LawChoice::DelayedWithLosses(g) => Arc::new(DelayedAlone::new(g.gain, g.delay_s)?),
+        LawChoice::Auxiliary(g) => Arc::new(Auxiliary::fixed(g.a1, g.a2)?),
+        LawChoice::AuxiliarySwitching(g) => Arc::new(Auxiliary::switching(g.a1, g.a2)?),
     })
 }
 
@@ -41,11 +65,27 @@ pub(in crate::mission) fn nominal_factor(choice: &LawChoice) -> f64 {
 pub(in crate::mission) fn law_name(choice: &LawChoice) -> &'static str {
     match choice {
         LawChoice::Introduction(_) => "introduction",
+        LawChoice::LeaderIntegral(_) => "leader_integral",
         LawChoice::Solution1(_) => "solution1",
         LawChoice::Solution2(_) => "solution2",
         LawChoice::Solution3(_) => "solution3",
+        LawChoice::Weighted(_) => "weighted",
+        LawChoice::MovingPattern(_) => "moving_pattern",
+        LawChoice::Directed(_) => "directed",
+        LawChoice::TrulyDecentralised(_) => "truly_decentralised",
         LawChoice::Switching(_) => "switching",
         LawChoice::Delayed(_) => "delayed",
         LawChoice::DelayedWithLosses(_) => "delayed_with_losses",
+        LawChoice::Auxiliary(_) => "auxiliary",
+        LawChoice::AuxiliarySwitching(_) => "auxiliary_switching",
+    }
+}
+
+/// The one vehicle that is told v_L, and the key that names it, under laws in which the others are not.
+pub(in crate::mission) fn told(choice: &LawChoice) -> Option<(&'static str, &str)> {
+    match choice {
+        LawChoice::LeaderIntegral(g) => Some(("leader", &g.leader)),
+        LawChoice::TrulyDecentralised(g) => Some(("told", &g.told)),
+        _ => None,
     }
 }

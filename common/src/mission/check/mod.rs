@@ -1,6 +1,7 @@
 //! From the file as written to a mission that can be flown, or to everything that is wrong with it.
 
 mod coordination;
+mod environment;
 mod network;
 mod time;
 mod vehicle;
@@ -9,7 +10,7 @@ use std::collections::HashMap;
 
 use toml::de::DeTable;
 
-use self::coordination::check_law;
+use self::coordination::{check_law, check_told, check_weights};
 use self::network::{check_links, check_switching};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
@@ -61,9 +62,11 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     check_name(faults, "name", &file.name);
     let times = check_times(faults, file);
     let speed = check_formation(faults, file);
-    let law = check_law(faults, file);
     let ids = check_ids(faults, &file.vehicles);
+    let law = check_law(faults, file, &ids);
     let links = check_links(faults, file, &ids);
+    check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = build::nominal_factor(&file.coordination.law);

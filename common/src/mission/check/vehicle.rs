@@ -3,8 +3,11 @@
 use nalgebra::Vector3;
 
 use super::super::fault::Collector;
-use super::super::file::{FollowingChoice, MissionFile, ModelChoice, PathChoice, SegmentChoice, VehicleSection};
-use super::super::{Start, VehiclePlan, build};
+use super::super::file::{
+    FollowingChoice, FollowingType, LawChoice, MissionFile, ModelChoice, PathChoice, SegmentChoice, VehicleSection,
+};
+use super::super::{Pattern, PatternMotion, Start, VehiclePlan, build};
+use super::environment::{check_disturbances, check_limits};
 use crate::coordination::{DemandKind, FleetLaw};
 use crate::path::Path;
 use crate::path::closest::closest_parameter;
@@ -29,7 +32,7 @@ pub(super) fn check_vehicle(
     ] {
         faults.finite(&format!("{key}.start.{name}"), value, "");
     }
-    faults.finite(&format!("{key}.pattern"), section.pattern, "units of xi");
+    let pattern = check_pattern(faults, file, &key, section);
     if let Some(xi) = start.xi {
         faults.finite(&format!("{key}.start.xi"), xi, "units of xi");
     }
@@ -46,6 +49,8 @@ pub(super) fn check_vehicle(
         let allowed = "a following law here or in [fleet]: line_of_sight, proposition31 or theorem47";
         faults.fault(&key, "no following", allowed);
     }
+    let disturbances = check_disturbances(faults, file, index);
+    let limits = model.as_ref().map(|model| check_limits(faults, file, index, model)).unwrap_or_default();
     let path = match build::path(&section.path) {
         Ok(path) => path,
         Err(reason) => {
@@ -61,12 +66,30 @@ pub(super) fn check_vehicle(
     let usable = position.iter().all(|x| x.is_finite());
     let xi = start.xi.or_else(|| usable.then(|| closest_parameter(path.as_ref(), position, true)))?;
     let start = Start { position: position.into(), yaw: start.yaw_deg.to_radians(), speed: start.speed_mps, xi };
-    let plan = VehiclePlan { id: section.id.clone(), pattern: section.pattern, path, start, model, following };
+    let plan = VehiclePlan { id: section.id.clone(), pattern, path, start, model, following, limits, disturbances };
     if let Err(reason) = build::craft(&plan, start, factor, fastest, law.map_or(DemandKind::Rate, |law| law.kind())) {
         faults.fault(&following_key(&key, section), reason, "");
         return None;
     }
     Some(plan)
+}
+
+/// The vehicle's place in the pattern.
+fn check_pattern(faults: &mut Collector<'_>, file: &MissionFile, key: &str, section: &VehicleSection) -> Pattern {
+    faults.finite(&format!("{key}.pattern"), section.pattern, "units of xi");
+    let Some(motion) = section.pattern_motion else { return Pattern::constant(section.pattern) };
+    let key = format!("{key}.pattern_motion");
+    faults.finite(&format!("{key}.amplitude"), motion.amplitude, "units of xi");
+    let ok = (1e-3..=1e9).contains(&motion.period_s);
+    faults.number(&format!("{key}.period_s"), motion.period_s, ok, "0.001 to 1000000000 s");
+    faults.finite(&format!("{key}.phase_deg"), motion.phase_deg, "deg");
+    if !matches!(file.coordination.law, LawChoice::MovingPattern(_)) {
+        let found = format!("a pattern that moves, under {}", build::law_name(&file.coordination.law));
+        faults.fault(&key, found, "a constant pattern for this law, or the law moving_pattern (3.70)");
+    }
+    let phase = motion.phase_deg.to_radians();
+    let motion = PatternMotion { amplitude: motion.amplitude, period: motion.period_s, phase };
+    Pattern { constant: section.pattern, motion: Some(motion) }
 }
 
 /// Where the following law of a vehicle is written.
@@ -124,10 +147,12 @@ fn check_fit(
         faults.fault(
             "coordination.law",
             found,
-            "introduction, switching, delayed or delayed_with_losses for this vehicle",
+            "introduction, leader_integral, switching, delayed, delayed_with_losses, auxiliary or auxiliary_switching for \
+             this vehicle",
         );
         ok = false;
     }
+    ok &= check_auxiliary(faults, section, file, key, following);
     let path_key = format!("{key}.path.{}", path_name(&section.path));
     if let Some(at) = path.tangent_breaks().first() {
         let found = format!("a path whose direction jumps at xi = {at}");
@@ -150,7 +175,45 @@ fn check_fit(
     ok
 }
 
-fn model_name(model: &ModelChoice) -> &'static str {
+/// (4.59) needs α_2 of Theorem 4.7, and both laws with an auxiliary state set the whole rate of the target.
+fn check_auxiliary(
+    faults: &mut Collector<'_>,
+    section: &VehicleSection,
+    file: &MissionFile,
+    key: &str,
+    following: &FollowingChoice,
+) -> bool {
+    let law = build::law_name(&file.coordination.law);
+    let (needs_alpha_2, is_auxiliary) = match file.coordination.law {
+        LawChoice::Auxiliary(_) => (true, true),
+        LawChoice::AuxiliarySwitching(_) => (false, true),
+        _ => (false, false),
+    };
+    match following {
+        FollowingChoice::Theorem47(gains) if is_auxiliary && gains.kind == FollowingType::I => {
+            let found = format!("theorem47 of kind I, whose target has a surplus rate of its own, under {law}");
+            faults.fault(
+                &following_key(key, section),
+                found,
+                "kind = \"II\" for this law, which gives the surplus rate",
+            );
+            false
+        }
+        FollowingChoice::Theorem47(_) => true,
+        other if needs_alpha_2 => {
+            let found = format!(
+                "{law}, which needs the alpha_2 of theorem47, for {} with {}",
+                section.id,
+                following_name(other)
+            );
+            faults.fault("coordination.law", found, "auxiliary_switching (4.62) for this vehicle, which does without");
+            false
+        }
+        _ => true,
+    }
+}
+
+pub(super) fn model_name(model: &ModelChoice) -> &'static str {
     match model {
         ModelChoice::KinematicUnicycle => "kinematic_unicycle",
         ModelChoice::DynamicUnicycle(_) => "dynamic_unicycle",

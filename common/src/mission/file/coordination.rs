@@ -25,7 +25,8 @@ pub enum Between {
     /// The last value heard.
     #[default]
     Hold,
-    /// The last value, advanced from when it was made to now at v_L: a network observer.
+    /// The last value, advanced from when it was made to now at v_L: a network observer. Vehicles that are not told v_L
+    /// advance at what they have learned, or at what the neighbour says.
     Advance,
     /// The last value, advanced from when it was made to now less the law's delay at the speed the fleet travels at:
     /// the sampled γ_j(t − τ) of (4.34) and (4.42).
@@ -38,18 +39,32 @@ pub enum Between {
 pub enum LawChoice {
     /// (1.5): two vehicles on lines.
     Introduction(GainOnly),
+    /// After (1.5): two vehicles on lines, one of which learns v_L.
+    LeaderIntegral(LeaderIntegral),
     /// Solution I, (3.43).
     Solution1(Solution1),
     /// Solution II, (3.44).
     Solution2(Solution2),
     /// Solution III with saturation, (3.45).
     Solution3(Solution3),
+    /// Solution II with weighted links, (3.62).
+    Weighted(Weighted),
+    /// Solution III about a pattern that moves, (3.70).
+    MovingPattern(Solution3),
+    /// One-way links, (3.72); with a pattern, (3.86).
+    Directed(Directed),
+    /// One vehicle is told v_L, (3.90) to (3.92).
+    TrulyDecentralised(TrulyDecentralised),
     /// Switching networks, (4.21).
     Switching(GainOnly),
     /// Delayed information, every vehicle always with a neighbour, (4.34).
     Delayed(Delayed),
     /// Delayed information and losses, (4.42).
     DelayedWithLosses(Delayed),
+    /// Auxiliary state that takes up alpha_2, fixed network, (4.59) to (4.61).
+    Auxiliary(Auxiliary),
+    /// Auxiliary state, switching network, (4.62).
+    AuxiliarySwitching(Auxiliary),
 }
 
 /// One gain.
@@ -57,6 +72,17 @@ pub enum LawChoice {
 pub struct GainOnly {
     /// Coordination gain k (1/s).
     pub gain: f64,
+}
+
+/// Who knows v_L, and the gains of the law after (1.5).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct LeaderIntegral {
+    /// The vehicle that knows v_L; the other learns it.
+    pub leader: String,
+    /// a_i, the same for both (1/s).
+    pub a: f64,
+    /// b_2 of the integral (1/s²); a² gives a double root at -a.
+    pub b: f64,
 }
 
 /// Gains of (3.43).
@@ -73,6 +99,70 @@ pub struct Solution2 {
     pub a: f64,
     /// b_i, the same for all (m²/s²).
     pub b: f64,
+}
+
+/// Gains and weights of (3.62).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Weighted {
+    /// a_i, the same for all (1/s).
+    pub a: f64,
+    /// b_i, the same for all (m²/s²).
+    pub b: f64,
+    /// Weights of links; a link that is not named has 1.
+    #[serde(default)]
+    pub weights: Vec<LinkWeight>,
+}
+
+/// The weight of a link, both ways.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct LinkWeight {
+    /// The two vehicles.
+    pub link: [String; 2],
+    /// w_k, above 0.
+    pub weight: f64,
+}
+
+/// Gains of (3.72).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Directed {
+    /// a, the same for all (1/s).
+    pub a: f64,
+    /// b, the same for all (1/s²).
+    pub b: f64,
+}
+
+/// Who is told v_L, and the gains of (3.92).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct TrulyDecentralised {
+    /// The vehicle that is told v_L and runs the virtual leader, which starts where its own target does.
+    pub told: String,
+    /// a, the same for all (1/s).
+    pub a: f64,
+    /// b, the same for all (1/s²).
+    pub b: f64,
+    /// Whether neighbours add up or are averaged.
+    #[serde(default)]
+    pub laplacian: Laplacian,
+}
+
+/// Which Laplacian a law is computed with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Laplacian {
+    /// L: neighbours add up.
+    Plain,
+    /// D⁻¹L: neighbours are averaged.
+    #[default]
+    Normalised,
+}
+
+/// Gains of (4.59) to (4.62).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Auxiliary {
+    /// a_1, the same for all (1/s).
+    pub a1: f64,
+    /// a_2, the same for all (1/s).
+    pub a2: f64,
 }
 
 /// Gains of (3.45).

@@ -3,12 +3,14 @@
 //! Nothing here is checked beyond its type; the check turns it into a [`super::Mission`].
 
 mod coordination;
+mod environment;
 mod following;
 mod network;
 mod path;
 mod vehicle;
 
 pub use coordination::*;
+pub use environment::*;
 pub use following::*;
 pub use network::*;
 pub use path::*;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{FollowingChoice, PathChoice};
+use super::{CurrentSection, FailureChoice, FollowingChoice, LimitsSection, NoiseSection, PathChoice};
 
 /// What all vehicles have in common; a vehicle may differ.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -12,6 +12,14 @@ pub struct FleetSection {
     pub model: Option<ModelChoice>,
     /// The path-following law.
     pub following: Option<FollowingChoice>,
+    /// What the actuators give at most.
+    pub limits: Option<LimitsSection>,
+    /// How the water moves.
+    pub current: Option<CurrentSection>,
+    /// How the instruments err.
+    pub noise: Option<NoiseSection>,
+    /// What fails, and when.
+    pub failure: Option<FailureChoice>,
 }
 
 /// One vehicle.
@@ -26,10 +34,32 @@ pub struct VehicleSection {
     /// Its place h_i in the formation pattern: it is coordinated when xi_i - h_i agree.
     #[serde(default)]
     pub pattern: f64,
+    /// How its place moves about `pattern`, for the law moving_pattern.
+    pub pattern_motion: Option<PatternMotionSection>,
     /// Its plant, if other than the fleet's.
     pub model: Option<ModelChoice>,
     /// Its path-following law, if other than the fleet's.
     pub following: Option<FollowingChoice>,
+    /// What its actuators give at most, if other than the fleet's.
+    pub limits: Option<LimitsSection>,
+    /// How the water moves around it, if other than around the fleet.
+    pub current: Option<CurrentSection>,
+    /// How its instruments err, if other than the fleet's.
+    pub noise: Option<NoiseSection>,
+    /// What fails on it, and when, if other than on the fleet.
+    pub failure: Option<FailureChoice>,
+}
+
+/// A place in the pattern that moves: amplitude sin(2π t / period + phase) is added to it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct PatternMotionSection {
+    /// Amplitude (units of xi).
+    pub amplitude: f64,
+    /// Period (s).
+    pub period_s: f64,
+    /// Phase at the start (deg).
+    #[serde(default)]
+    pub phase_deg: f64,
 }
 
 /// Where a vehicle starts.

@@ -1,0 +1,121 @@
+//! The flight itself: its clock, its channel, and the conducting of stepped runs.
+
+use common::machine::Machine;
+use common::record::{Record, Row, SpeedRow};
+use common::time::Time;
+use common::wire::vehicle::{ClockPlan, Phase, ToVehicle};
+
+use super::{Hub, HubOutput, Opened};
+use crate::emulator::{Channel, Emulator, Sent};
+use crate::lockstep::Lockstep;
+
+impl Hub {
+    pub(super) fn clock_started(&mut self, now: Time, clock: ClockPlan) {
+        let Some(load) = &mut self.load else { return };
+        let speed_up = match clock {
+            ClockPlan::Real { speed_up, .. } => Some(speed_up),
+            ClockPlan::Stepped => None,
+        };
+        let real = speed_up.is_some();
+        load.phase = Phase::Running;
+        load.clock = Some(clock);
+        load.emulator = Emulator::new(load.mission.clone(), speed_up);
+        load.lockstep = (!real).then(|| Lockstep::new(&load.mission, self.window));
+        let (mission, fresh) = (Opened(load.mission.clone()), !load.adopted);
+        self.outputs.push_back(HubOutput::OpenLog { mission, fresh });
+        if load.adopted {
+            load.emulator.skip_to(now);
+            while load.emulator.poll_output().is_some() {}
+            let text = format!("the emulator came back at {now}");
+            return self.note(now, &text);
+        }
+        load.speeds.clear();
+        let digest = load.mission.digest;
+        for step in load.mission.speed.steps() {
+            let row = SpeedRow { t_ns: step.at.nanos(), speed: step.speed };
+            self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
+        }
+        let name = load.mission.name.clone();
+        for known in self.vehicles.values_mut().filter(|known| known.phase == Phase::Armed) {
+            known.phase = Phase::Running;
+        }
+        self.tell_fleet(&ToVehicle::Start { digest, clock, speeds: Vec::new() });
+        self.drain_emulator();
+        self.say(format!("{name} is under way"));
+        if !real {
+            self.grant();
+        }
+    }
+
+    /// Stepped clock: lets the fleet run as far as causality allows.
+    pub(super) fn grant(&mut self) {
+        let Some(load) = &mut self.load else { return };
+        let Some(lockstep) = &mut load.lockstep else { return };
+        let until = lockstep.horizon();
+        // What arrives strictly before `until` is heard within the grant.
+        while let Some(at) = load.emulator.poll_timeout().filter(|at| *at < until) {
+            load.emulator.handle(at, None);
+        }
+        lockstep.grant(until);
+        self.drain_emulator();
+        let Some(load) = &mut self.load else { return };
+        let Some(lockstep) = &mut load.lockstep else { return };
+        let speeds = std::mem::take(&mut lockstep.speeds);
+        for (index, vehicle) in load.mission.vehicles.iter().enumerate() {
+            let heard = std::mem::take(&mut lockstep.heard[index]).0;
+            let message = ToVehicle::Grant { until, heard, speeds: speeds.clone() };
+            self.outputs.push_back(HubOutput::ToVehicle(vehicle.id.clone(), message));
+        }
+    }
+
+    pub(super) fn reached(&mut self, id: &str, until: Time, sent: Vec<(Time, Vec<u8>)>) {
+        let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else { return };
+        let (Some(index), Some(lockstep)) = (load.mission.index_of(id), &mut load.lockstep) else { return };
+        if !lockstep.reached(index, until, sent) {
+            return;
+        }
+        load.now = until;
+        for (at, from, bytes) in lockstep.take_sent() {
+            load.emulator.handle(at, Some(Sent { from, bytes: bytes.into() }));
+        }
+        if until < load.mission.end {
+            self.grant();
+        } else {
+            while let Some(at) = load.emulator.poll_timeout().filter(|at| *at <= until) {
+                load.emulator.handle(at, None);
+            }
+            self.finish(until);
+        }
+    }
+
+    pub(super) fn finish(&mut self, now: Time) {
+        let Some(load) = &mut self.load else { return };
+        load.emulator.finish(now);
+        load.phase = Phase::Finished;
+        load.now = load.mission.end;
+        let name = load.mission.name.clone();
+        self.drain_emulator();
+        self.outputs.push_back(HubOutput::CloseLog);
+        self.say(format!("{name} is over"));
+    }
+
+    /// Carries out what the channel decided.
+    pub(super) fn drain_emulator(&mut self) {
+        let Some(load) = &mut self.load else { return };
+        while let Some(output) = load.emulator.poll_output() {
+            match output {
+                Channel::Record(row) => self.outputs.push_back(HubOutput::Record(row)),
+                Channel::Settled(settled) => self.outputs.push_back(HubOutput::Settled(settled)),
+                Channel::Deliver { to, due, bytes } => match &mut load.lockstep {
+                    Some(lockstep) => lockstep.heard[to].0.push((due, bytes.to_vec())),
+                    None => {
+                        // Who never joined is told nothing.
+                        if let Some(seat) = load.seats[to] {
+                            self.outputs.push_back(HubOutput::Deliver(seat, bytes));
+                        }
+                    }
+                },
+            }
+        }
+    }
+}

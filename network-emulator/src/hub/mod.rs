@@ -1,0 +1,276 @@
+//! The hub: the emulator program as a pure machine. Lets participants in, loads the mission, starts the clock, carries
+//! coordination states through the [`Emulator`], conducts the stepped clock, and relays the mission plane.
+//!
+//! The hub is the fleet's memory: a vehicle that comes back gets the mission and the clock from it, and so does a new
+//! mission-control. A hub that was killed gets both back from the first vehicle that finds it again.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use common::machine::Machine;
+use common::mission::Mission;
+use common::record::{Row, Settled};
+use common::time::Time;
+use common::wire::fleet::{FromFleet, Pace, ToFleet};
+use common::wire::vehicle::{ClockPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
+
+use crate::emulator::{Emulator, Sent};
+use crate::lockstep::{Lockstep, WINDOW};
+
+mod clock;
+mod control;
+mod vehicles;
+
+/// Name under which mission-control joins when it conducts a flight and collects its logs.
+pub const COLLECTOR: &str = "mission-control";
+/// Name under which single commands (status, speed, stop) join.
+pub const OPERATOR: &str = "operator";
+/// Name of the hub as a source of logs and notes.
+pub const HUB: &str = "network-emulator";
+
+/// A speed commanded now holds from this much later, so that every vehicle has it in time \[s of wall clock\].
+const SPEED_LEAD_S: f64 = 0.25;
+
+/// What can happen to the hub, beside the passing of time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HubInput {
+    /// A vehicle's line came up.
+    Joined {
+        /// Its name.
+        id: String,
+        /// The number of its line, which is the same whenever it comes back.
+        seat: usize,
+    },
+    /// A vehicle's line went down.
+    Left(String),
+    /// A vehicle said something on the mission plane.
+    FromVehicle(String, FromVehicle),
+    /// The vehicle of this seat put bytes on the air.
+    State(usize, Arc<[u8]>),
+    /// Mission-control, or an operator at another terminal, said something.
+    FromControl {
+        /// Who: the answer goes there.
+        who: String,
+        /// What.
+        message: ToFleet,
+    },
+    /// The log could not be opened, and why.
+    LogFailed(String),
+    /// The driver has started the clock.
+    ClockStarted(ClockPlan),
+    /// A piece of the hub's own log, as asked for.
+    Log(LogPiece),
+}
+
+/// What the hub wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HubOutput {
+    /// Say this to a vehicle on the mission plane.
+    ToVehicle(String, ToVehicle),
+    /// Hand these bytes to the vehicle of this seat on the coordination plane.
+    Deliver(usize, Arc<[u8]>),
+    /// Say this to mission-control, or to an operator.
+    ToControl {
+        /// To whom.
+        who: String,
+        /// What.
+        message: FromFleet,
+    },
+    /// Open a log for this mission.
+    OpenLog {
+        /// The mission.
+        mission: Opened,
+        /// Whether the flight begins: what an earlier flight of the same mission left is set aside.
+        fresh: bool,
+    },
+    /// Everything is collected: a process that was started for one flight may end.
+    Dismissed,
+    /// Record this row.
+    Record(Row),
+    /// Record what became of a message.
+    Settled(Settled),
+    /// The flight is over: close the log.
+    CloseLog,
+    /// Choose the clock's origin, start the clock, and answer with [`HubInput::ClockStarted`].
+    StartClock(Pace),
+    /// Follow this clock, which others started, and answer with [`HubInput::ClockStarted`].
+    FollowClock(ClockPlan),
+    /// Read a piece of the log and answer with [`HubInput::Log`].
+    ReadLog {
+        /// Which mission's.
+        digest: u64,
+        /// Which of its files.
+        file: u32,
+        /// From which byte.
+        offset: u64,
+    },
+    /// A line for people.
+    Say(String),
+}
+
+/// A mission whose log is to be opened.
+#[derive(Clone, Debug)]
+pub struct Opened(pub Arc<Mission>);
+
+impl PartialEq for Opened {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.digest == other.0.digest
+    }
+}
+
+/// The emulator program as a pure machine.
+pub struct Hub {
+    vehicles: BTreeMap<String, Known>,
+    /// Which vehicle of the loaded mission has a seat.
+    aboard: Vec<Option<usize>>,
+    load: Option<Load>,
+    /// Who asked for what is being answered.
+    asker: Option<String>,
+    /// Most control periods in one grant of the stepped clock.
+    window: i64,
+    outputs: VecDeque<HubOutput>,
+}
+
+#[derive(Clone, Debug)]
+struct Known {
+    connected: bool,
+    seat: usize,
+    phase: Phase,
+    reason: String,
+}
+
+struct Load {
+    mission: Arc<Mission>,
+    phase: Phase,
+    clock: Option<ClockPlan>,
+    emulator: Emulator,
+    /// The seat of each vehicle of the mission, once it has one.
+    seats: Vec<Option<usize>>,
+    lockstep: Option<Lockstep>,
+    /// Speeds commanded under way.
+    speeds: Vec<SpeedCommand>,
+    /// Taken over from a vehicle after the hub lost its memory.
+    adopted: bool,
+    /// Its logs are where they belong.
+    collected: bool,
+    now: Time,
+}
+
+impl Default for Hub {
+    fn default() -> Self {
+        Hub::new()
+    }
+}
+
+impl Hub {
+    /// A hub that knows nothing yet.
+    pub fn new() -> Hub {
+        Hub::with_window(WINDOW)
+    }
+
+    /// A hub whose stepped clock grants at most this many control periods at once. What is flown does not depend on it.
+    pub fn with_window(window: i64) -> Hub {
+        Hub { vehicles: BTreeMap::new(), aboard: Vec::new(), load: None, asker: None, window, outputs: VecDeque::new() }
+    }
+
+    /// Where the fleet is in its life.
+    pub fn phase(&self) -> Phase {
+        self.load.as_ref().map_or(Phase::Idle, |load| load.phase)
+    }
+
+    /// Mission time up to which a stepped run is complete.
+    pub fn mission_time(&self) -> Time {
+        self.load.as_ref().map_or(Time::ZERO, |load| load.now)
+    }
+
+    /// Sent, delivered, dropped and in flight over all links.
+    pub fn totals(&self) -> [u64; 4] {
+        self.load.as_ref().map_or([0; 4], |load| load.emulator.totals())
+    }
+
+    fn say(&mut self, text: String) {
+        self.outputs.push_back(HubOutput::Say(text));
+    }
+
+    fn tell_vehicle(&mut self, id: &str, message: ToVehicle) {
+        self.outputs.push_back(HubOutput::ToVehicle(id.to_string(), message));
+    }
+
+    /// Answers whoever asked, if anyone did.
+    fn answer(&mut self, message: FromFleet) {
+        if let Some(who) = self.asker.clone() {
+            self.outputs.push_back(HubOutput::ToControl { who, message });
+        }
+    }
+
+    fn refuse(&mut self, reason: String) {
+        self.answer(FromFleet::Refused { reason });
+    }
+
+    /// Ids of the mission's vehicles that are connected, in the mission's order.
+    fn connected(&self) -> Vec<String> {
+        let Some(load) = &self.load else { return Vec::new() };
+        let is_up = |id: &str| self.vehicles.get(id).is_some_and(|known| known.connected);
+        load.mission.vehicles.iter().map(|v| v.id.clone()).filter(|id| is_up(id)).collect()
+    }
+
+    fn tell_fleet(&mut self, message: &ToVehicle) {
+        for id in self.connected() {
+            self.tell_vehicle(&id, message.clone());
+        }
+    }
+}
+
+impl Machine for Hub {
+    type Input = HubInput;
+    type Output = HubOutput;
+
+    fn handle(&mut self, now: Time, input: Option<HubInput>) {
+        match input {
+            Some(HubInput::Joined { id, seat }) => self.joined(id, seat),
+            Some(HubInput::Left(id)) => self.left(now, &id),
+            Some(HubInput::FromVehicle(id, message)) => self.hear_vehicle(now, &id, message),
+            Some(HubInput::FromControl { who, message }) => {
+                self.asker = Some(who);
+                self.hear_control(now, message);
+                self.asker = None;
+            }
+            Some(HubInput::LogFailed(reason)) => self.stop(now, &reason),
+            Some(HubInput::ClockStarted(clock)) => self.clock_started(now, clock),
+            Some(HubInput::Log(piece)) => {
+                self.collected(HUB, piece);
+            }
+            Some(HubInput::State(seat, bytes)) => {
+                if let Some(load) = self.load.as_mut().filter(|l| l.phase == Phase::Running && l.lockstep.is_none())
+                    && let Some(Some(from)) = self.aboard.get(seat).copied()
+                {
+                    load.emulator.handle(now, Some(Sent { from, bytes }));
+                    self.drain_emulator();
+                }
+            }
+            None => {
+                if let Some(load) = self.load.as_mut().filter(|l| l.phase == Phase::Running && l.lockstep.is_none()) {
+                    load.now = now;
+                    load.emulator.handle(now.min(load.mission.end), None);
+                    let over = now >= load.mission.end;
+                    self.drain_emulator();
+                    if over {
+                        self.finish(now);
+                    }
+                }
+            }
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<HubOutput> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        let load = self.load.as_ref().filter(|l| l.phase == Phase::Running && l.lockstep.is_none())?;
+        Some(load.emulator.poll_timeout().map_or(load.mission.end, |at| at.min(load.mission.end)))
+    }
+}
+
+#[cfg(test)]
+mod tests;

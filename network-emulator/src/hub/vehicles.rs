@@ -1,0 +1,155 @@
+//! What the vehicles say to the hub, and their comings and goings.
+
+use std::sync::Arc;
+
+use common::mission::{Mission, digest};
+use common::time::Time;
+use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, Phase, ToVehicle};
+
+use super::{Hub, HubOutput, Known, Load};
+
+impl Hub {
+    pub(super) fn joined(&mut self, id: String, seat: usize) {
+        let known = self.vehicles.entry(id).or_insert(Known {
+            connected: true,
+            seat,
+            phase: Phase::Idle,
+            reason: String::new(),
+        });
+        (known.connected, known.seat) = (true, seat);
+        self.take_seats();
+    }
+
+    /// Notes which vehicle of the mission has which seat: a message must find its way without a look at names.
+    pub(super) fn take_seats(&mut self) {
+        self.aboard.clear();
+        let Some(load) = &mut self.load else { return };
+        let seat_of = |id: &str| self.vehicles.get(id).map(|known| known.seat);
+        load.seats = load.mission.vehicles.iter().map(|vehicle| seat_of(&vehicle.id)).collect();
+        self.aboard.resize(load.seats.iter().flatten().max().map_or(0, |most| most + 1), None);
+        for (vehicle, seat) in load.seats.iter().enumerate() {
+            if let Some(seat) = seat {
+                self.aboard[*seat] = Some(vehicle);
+            }
+        }
+    }
+
+    pub(super) fn left(&mut self, now: Time, id: &str) {
+        if let Some(known) = self.vehicles.get_mut(id) {
+            known.connected = false;
+        }
+        let Some(load) = &self.load else { return };
+        if load.mission.index_of(id).is_none() || load.phase != Phase::Running {
+            return;
+        }
+        if load.lockstep.is_some() {
+            self.stop(now, &format!("{id} left a stepped run, which needs every vehicle"));
+        } else {
+            self.note(now, &format!("lost the line to {id}"));
+        }
+    }
+
+    pub(super) fn hear_vehicle(&mut self, now: Time, id: &str, message: FromVehicle) {
+        match message {
+            FromVehicle::Hello { phase, flight } => self.hello(id, phase, flight),
+            FromVehicle::Armed { digest } => {
+                if self.set_phase(id, digest, Phase::Armed, String::new()) {
+                    self.join_flight(now, id);
+                }
+            }
+            FromVehicle::Refused { digest, reason } => {
+                self.say(format!("{id} refuses the mission: {reason}"));
+                self.set_phase(id, digest, Phase::Idle, reason);
+            }
+            FromVehicle::Reached { until, sent } => self.reached(id, until, sent),
+            FromVehicle::Ended { phase, reason } => {
+                if let Some(known) = self.vehicles.get_mut(id) {
+                    known.phase = phase;
+                    known.reason = reason;
+                }
+                if phase == Phase::Aborted
+                    && self.load.as_ref().is_some_and(|l| l.phase == Phase::Running && l.lockstep.is_some())
+                {
+                    self.stop(now, &format!("{id} aborted a stepped run, which needs every vehicle"));
+                }
+            }
+            FromVehicle::Log(piece) => {
+                self.collected(id, piece);
+            }
+        }
+    }
+
+    /// Takes a vehicle's word for its phase if it speaks of the loaded mission.
+    pub(super) fn set_phase(&mut self, id: &str, digest: u64, phase: Phase, reason: String) -> bool {
+        if self.load.as_ref().is_none_or(|load| load.mission.digest != digest) {
+            return false;
+        }
+        let Some(known) = self.vehicles.get_mut(id) else { return false };
+        known.phase = phase;
+        known.reason = reason;
+        true
+    }
+
+    pub(super) fn hello(&mut self, id: &str, phase: Phase, flight: Option<FlightPlan>) {
+        let same = |load: &Load, flight: &FlightPlan| load.mission.digest == digest(&flight.mission);
+        if let Some(known) = self.vehicles.get_mut(id) {
+            known.phase = phase;
+        }
+        match (&self.load, flight) {
+            (None, Some(flight)) => self.adopt(id, phase, flight),
+            (Some(load), Some(flight)) if same(load, &flight) && phase != Phase::Armed => {
+                // It has flown on alone; tell it what it missed.
+                for command in load.speeds.clone() {
+                    self.tell_vehicle(id, ToVehicle::Speed(command));
+                }
+            }
+            (Some(load), _) if load.mission.index_of(id).is_some() => self.arm(id),
+            _ => {}
+        }
+    }
+
+    /// After a restart: the vehicles know what the hub has forgotten.
+    pub(super) fn adopt(&mut self, id: &str, phase: Phase, flight: FlightPlan) {
+        let Ok(mission) = Mission::parse("a vehicle's mission", &flight.mission) else { return };
+        if mission.index_of(id).is_none() {
+            return;
+        }
+        self.load(Arc::new(mission), true);
+        if let Some(known) = self.vehicles.get_mut(id) {
+            known.phase = phase;
+        }
+        let Some(load) = &mut self.load else { return };
+        load.speeds = flight.speeds;
+        match (phase, flight.clock) {
+            (Phase::Running, ClockPlan::Real { .. }) => {
+                let name = load.mission.name.clone();
+                self.outputs.push_back(HubOutput::FollowClock(flight.clock));
+                self.say(format!("{id} is flying {name}: carrying on"));
+            }
+            (phase, _) => {
+                load.phase = phase;
+                load.now = load.mission.end;
+            }
+        }
+        let others: Vec<String> = self.connected().into_iter().filter(|other| other != id).collect();
+        for other in others {
+            self.arm(&other);
+        }
+    }
+
+    /// A vehicle was armed: if the fleet is under way, it joins.
+    pub(super) fn join_flight(&mut self, now: Time, id: &str) {
+        let Some(load) = self.load.as_ref().filter(|load| load.phase == Phase::Running) else { return };
+        if load.lockstep.is_some() {
+            return;
+        }
+        if let Some(clock) = load.clock {
+            let (digest, speeds) = (load.mission.digest, load.speeds.clone());
+            self.tell_vehicle(id, ToVehicle::Start { digest, clock, speeds });
+            if let Some(known) = self.vehicles.get_mut(id) {
+                known.phase = Phase::Running;
+            }
+            self.note(now, &format!("{id} joins the flight under way"));
+        }
+    }
+}
