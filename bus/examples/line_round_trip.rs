@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 use bus::Plane;
 use bus::clock::sharpen_this_thread;
 use bus::line::{Line, LineConfig, LineEvent};
+use bus::queue::Events;
 use bus::setup::{Endpoint, share_one_runtime};
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 
@@ -39,7 +40,7 @@ fn main() -> Outcome {
 
 fn echo(endpoint: Endpoint, id: &str) -> Outcome {
     let (line, events) = Line::connect(LineConfig::new(endpoint, id))?;
-    for event in &events {
+    for event in events {
         match event {
             LineEvent::Packet { plane, bytes, .. } => line.send(plane, &bytes)?,
             LineEvent::Connected => {}
@@ -64,7 +65,7 @@ fn child(arguments: &[&str]) -> std::io::Result<Child> {
 }
 
 fn measure(count: usize, participants: usize) -> Outcome {
-    let (hub, events) = Switchboard::open(SwitchboardConfig::new(Endpoint::local().with_port(0)))?;
+    let (mut hub, events) = Switchboard::open(SwitchboardConfig::new(Endpoint::local().with_port(0)))?;
     let endpoint = hub.endpoint().to_string();
     let mut children = Vec::new();
     let mut lines = Vec::new();
@@ -104,7 +105,7 @@ fn measure(count: usize, participants: usize) -> Outcome {
 }
 
 /// Sends to every line, and waits until every line has answered.
-fn round(hub: &Switchboard, events: &Receiver<HubEvent>, plane: Plane, lines: &[LineId]) -> Outcome {
+fn round(hub: &Switchboard, events: &Events<HubEvent>, plane: Plane, lines: &[LineId]) -> Outcome {
     for &line in lines {
         hub.send(line, plane, &MESSAGE)?;
     }

@@ -5,10 +5,16 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
+use cpf_common::coordination::auxiliary_4_59::Auxiliary;
+use cpf_common::coordination::decentralised_3_92::{Decentralised, Weighing};
+use cpf_common::coordination::directed_3_72::Directed;
 use cpf_common::coordination::introduction_1_5::Introduction;
+use cpf_common::coordination::leader_1_5::LeaderIntegral;
+use cpf_common::coordination::pattern_3_70::MovingPattern;
 use cpf_common::coordination::solution_1_3_43::SolutionOne;
 use cpf_common::coordination::switching_4_21::Switching;
-use cpf_common::coordination::{CoordinationLaw, Neighbour, SpeedReference};
+use cpf_common::coordination::weighted_3_62::Weighted;
+use cpf_common::coordination::{CoordinationLaw, FleetLaw, Neighbour, Own, SpeedReference};
 use cpf_common::craft::Craft;
 use cpf_common::craft::kinematic::KinematicCraft;
 use cpf_common::craft::robot::{RobotCraft, SpeedLoop};
@@ -66,6 +72,27 @@ fn robot_with_3_43(bencher: divan::Bencher) {
 #[divan::bench]
 fn robot_with_4_21(bencher: divan::Bencher) {
     period(bencher, robot(SpeedLoop::Rate { k_0: 2.0 }), Switching::new(0.1).expect("a gain"));
+}
+
+/// The laws that differ from vehicle to vehicle or have states: one demand, one period of their own states, one word.
+#[divan::bench(args = ["1.5 leader", "3.62", "3.70", "3.72", "3.92", "4.59", "4.62"])]
+fn one_row_of(bencher: divan::Bencher, law: &str) {
+    let law: Box<dyn FleetLaw> = match law {
+        "1.5 leader" => Box::new(LeaderIntegral::new(1, 0.2, 0.04).expect("gains")),
+        "3.62" => Box::new(Weighted::new(1.0, 1.0, 2, &[(0, 1, 2.0)]).expect("gains")),
+        "3.70" => Box::new(MovingPattern::new(1.0, 0.25, 1.0).expect("gains")),
+        "3.72" => Box::new(Directed::new(2.0, 1.0).expect("gains")),
+        "3.92" => Box::new(Decentralised::new(0, 1.0, 1.0, Weighing::Normalised).expect("gains")),
+        "4.59" => Box::new(Auxiliary::fixed(10.0, 16.0).expect("gains")),
+        _ => Box::new(Auxiliary::switching(10.0, 16.0).expect("gains")),
+    };
+    let mut vehicle = law.vehicle(0);
+    let own = Own { xi: 0.3, eta: 0.1, r: 2.0, v: 0.3, h_dot: 0.1, alpha_2: 0.1, ..Own::default() };
+    bencher.bench_local(|| {
+        let demand = vehicle.demand(REFERENCE, black_box(&own), black_box(&NEIGHBOURS));
+        vehicle.advance(0.02);
+        black_box((demand, vehicle.says(&own)))
+    });
 }
 
 #[divan::bench]

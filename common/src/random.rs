@@ -7,6 +7,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use sha2::{Digest, Sha256};
 
+/// Independent numbers that belong to one index of a stream.
+pub const LANES: usize = 8;
+
 /// A deterministic stream of random numbers.
 #[derive(Clone, Debug)]
 pub struct Stream(ChaCha8Rng);
@@ -22,10 +25,15 @@ impl Stream {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
     /// The `index`-th number of the stream, uniform on \[0, 1): a function of seed, name and index alone, whatever was
-    /// drawn before. Two numbers of one index are taken with `lane` 0 and 1.
+    /// drawn before. Several numbers of one index are taken with `lane` 0, 1, … up to [`LANES`].
     pub fn unit_at(&mut self, index: u64, lane: u8) -> f64 {
         self.0.set_word_pos(u128::from(index) * 16 + u128::from(lane) * 2);
         self.unit()
+    }
+    /// All numbers of one index at once, by lane: the same as [`Self::unit_at`] gives one by one, for the price of one.
+    pub fn units_at(&mut self, index: u64) -> [f64; LANES] {
+        self.0.set_word_pos(u128::from(index) * 16);
+        std::array::from_fn(|_| self.unit())
     }
     /// Uniform on \[low, high).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
@@ -60,6 +68,9 @@ mod tests {
         stream.unit_at(77, 0);
         assert_eq!((stream.unit_at(5, 0), stream.unit_at(5, 1)), (fifth, lane));
         assert_ne!(fifth, lane);
+        let together = stream.units_at(5);
+        assert_eq!(together[..2], [fifth, lane]);
+        assert_eq!(together.map(f64::to_bits), [0, 1, 2, 3, 4, 5, 6, 7].map(|lane| stream.unit_at(5, lane).to_bits()));
     }
 
     #[test]

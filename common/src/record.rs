@@ -45,10 +45,76 @@ pub enum Fate {
     Lost,
     /// The link was down when it should have arrived.
     LinkDown,
-    /// The queue of the link was full.
+    /// The queue of the link, or of the sender, was full.
     QueueFull,
     /// Still under way when the mission ended.
     InFlight,
+    /// The receiver was too far away.
+    OutOfRange,
+    /// The receiver was speaking itself.
+    HalfDuplex,
+    /// Another message arrived at the receiver at the same time.
+    Collision,
+    /// Handed over with a flipped bit, by which the receiver knows it for garbage.
+    Corrupt,
+    /// A second copy, which the network made, was handed to the receiver.
+    Copied,
+    /// A second copy did not get there, whyever.
+    CopyDropped,
+    /// A second copy was still under way when the mission ended.
+    CopyInFlight,
+}
+
+impl Fate {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Fate; 12] = [
+        Fate::Delivered,
+        Fate::Lost,
+        Fate::LinkDown,
+        Fate::QueueFull,
+        Fate::InFlight,
+        Fate::OutOfRange,
+        Fate::HalfDuplex,
+        Fate::Collision,
+        Fate::Corrupt,
+        Fate::Copied,
+        Fate::CopyDropped,
+        Fate::CopyInFlight,
+    ];
+
+    /// The causes for which a message is dropped.
+    pub const DROPS: [Fate; 7] = [
+        Fate::Lost,
+        Fate::OutOfRange,
+        Fate::LinkDown,
+        Fate::QueueFull,
+        Fate::HalfDuplex,
+        Fate::Collision,
+        Fate::Corrupt,
+    ];
+
+    /// Whether it is that of a second copy, which nobody sent.
+    pub fn is_of_copy(self) -> bool {
+        matches!(self, Fate::Copied | Fate::CopyDropped | Fate::CopyInFlight)
+    }
+
+    /// Its name, the same as in a recording.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Fate::Delivered => "delivered",
+            Fate::Lost => "lost",
+            Fate::LinkDown => "link_down",
+            Fate::QueueFull => "queue_full",
+            Fate::InFlight => "in_flight",
+            Fate::OutOfRange => "out_of_range",
+            Fate::HalfDuplex => "half_duplex",
+            Fate::Collision => "collision",
+            Fate::Corrupt => "corrupt",
+            Fate::Copied => "copied",
+            Fate::CopyDropped => "copy_dropped",
+            Fate::CopyInFlight => "copy_in_flight",
+        }
+    }
 }
 
 /// One message on one directed link, written when its fate is known.

@@ -5,15 +5,21 @@ use std::process::ExitCode;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use bus::console::StopFlag;
 use bus::setup::Endpoint;
 use clap::{Parser, Subcommand, ValueEnum};
 use common::mission::Mission;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::Phase;
 
-use crate::console::Progress;
-use crate::results::{Summary, TheoryRow, diff, export_csv};
+use crate::console::{Count, Progress};
+use crate::gallery::{GALLERY, Gallery};
+use crate::results::{Summary, TheoryRow, diff, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
+use crate::sweep::measure::index_of;
+use crate::sweep::plan::{self, Plan as SweepPlan};
+use crate::sweep::setting::Setting;
+use crate::sweep::study::Study;
 use crate::{folder, operator, rehearse, theory, worst};
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
@@ -55,12 +61,51 @@ enum What {
         /// The run folder (default: runs/MISSION-TIME)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        /// Another value for a key of the mission file, such as network.loss=0.3; may be repeated
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        sets: Vec<String>,
+        /// Another seed
+        #[arg(long)]
+        seed: Option<u64>,
         /// JSON for a pipe
         #[arg(long)]
         json: bool,
     },
+    /// Fly a mission with every combination of some values, each several times, and sum up what came of it
+    Sweep {
+        /// The mission file
+        mission: PathBuf,
+        /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated
+        #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
+        sets: Vec<String>,
+        /// Runs of every combination, each with a seed of its own
+        #[arg(long, value_name = "TIMES", default_value = "1")]
+        repeat: u32,
+        /// The number that is drawn; a column of runs.csv
+        #[arg(long, value_name = "COLUMN", default_value = "coordination_last")]
+        measure: String,
+        /// The sweep's folder; the same command goes on with what is there (default: runs/sweep-MISSION)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Fly the sweeps of a study and write its page
+    Study {
+        /// The study file
+        study: PathBuf,
+        /// The study's folder; the same command goes on with what is there (default: runs/study-NAME)
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Fly a mission as real processes: one per vehicle, one for the network between them
     Run(RunArgs),
+    /// Fly all missions of a folder and show them on one page, with the numbers expected of them (exit code 1: one disagrees)
+    Gallery {
+        /// The folder: missions, and gallery.toml, which says what figures they make
+        missions: PathBuf,
+        /// Where the page goes
+        #[arg(long, value_name = "DIR", default_value = "runs/gallery")]
+        out: PathBuf,
+    },
     /// Set the formation speed of the fleet under way
     Speed {
         /// The speed v_L (units of xi per s)
@@ -195,10 +240,9 @@ struct FleetArgs {
 enum Format {
     /// vehicles.csv, links.csv and topology.csv
     Csv,
+    /// network.toml: when links were up and what they lost, as a section of a mission file
+    Network,
 }
-
-/// Longest mission file (bytes).
-const MISSION_BYTES: u64 = 1 << 20;
 
 /// How long a single command waits for the fleet to appear.
 const COMMAND_PATIENCE: Duration = Duration::from_secs(3);
@@ -222,13 +266,16 @@ pub fn main(cli: Cli) -> ExitCode {
 fn run(what: What) -> Ended {
     match what {
         What::Check { mission, json, figures } => check(&mission, json, figures.as_deref()),
-        What::Simulate { mission, out, json } => simulate(&mission, out.as_deref(), json),
+        What::Simulate { mission, out, sets, seed, json } => simulate(&mission, out.as_deref(), &sets, seed, json),
+        What::Sweep { mission, sets, repeat, measure, out } => sweep(&mission, &sets, repeat, &measure, out),
+        What::Study { study: path, out } => study(&path, out),
         What::Run(args) => run_fleet(args),
+        What::Gallery { missions, out } => gallery(&missions, &out),
         What::Speed { speed, fleet } => speed_command(speed, &fleet.attach),
         What::Status { json, fleet } => status(json, &fleet.attach),
         What::Stop { fleet } => stop(&fleet.attach),
         What::Report { run } => report(&run),
-        What::Export { run, format: Format::Csv, out } => export(&run, out),
+        What::Export { run, format, out } => export(&run, format, out),
         What::Diff { a, b } => compare(&a, &b),
         What::Recover { recording, out } => recover(&recording, out),
         What::Worst(args) => search(&args),
@@ -242,22 +289,7 @@ fn run(what: What) -> Ended {
 }
 
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
-    let unreadable =
-        |error: std::io::Error| End(2, format!("cannot read the mission file {}: {error}", path.display()));
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    std::io::Read::read_to_string(&mut std::io::Read::take(file, MISSION_BYTES + 1), &mut text).map_err(unreadable)?;
-    if text.len() as u64 > MISSION_BYTES {
-        let reason = format!("the mission file {} is too long; allowed: {MISSION_BYTES} bytes", path.display());
-        return Err(End(2, reason));
-    }
-    Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
-        let n = faults.list.len();
-        End(
-            2,
-            format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display()),
-        )
-    })
+    folder::load(path).map_err(|reason| End(2, reason))
 }
 
 fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
@@ -332,11 +364,88 @@ fn print_theory(rows: &[TheoryRow]) {
     }
 }
 
-fn simulate(path: &Path, out: Option<&Path>, json: bool) -> Ended {
-    let mission = load(path)?;
+fn simulate(path: &Path, out: Option<&Path>, sets: &[String], seed: Option<u64>, json: bool) -> Ended {
+    let mission = changed(load(path)?, sets, seed).map_err(|reason| End(2, reason))?;
     warn(&theory::rows(&mission, None));
     let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
     tell(&mission, &folder, outcome.phase, &summary, &[], json)
+}
+
+/// The mission with some of its keys at other values.
+fn changed(mission: Arc<Mission>, sets: &[String], seed: Option<u64>) -> Result<Arc<Mission>, String> {
+    let mut settings = sets.iter().map(|text| Setting::parse(text)).collect::<Result<Vec<_>, _>>()?;
+    if let Some(several) = settings.iter().find(|setting| setting.values.len() > 1) {
+        return Err(format!("--set {}: found several values; allowed: one (several are for sweep)", several.key));
+    }
+    settings.extend(seed.map(|seed| Setting::parse(&format!("seed={seed}"))).transpose()?);
+    if settings.is_empty() {
+        return Ok(mission);
+    }
+    let changes: Vec<_> = settings.iter().map(|setting| (setting.key.as_str(), &setting.values[0])).collect();
+    let text = plan::apply(&mission.text, &changes)?;
+    Mission::parse(folder::MISSION, &text).map(Arc::new).map_err(|faults| faults.to_string())
+}
+
+fn sweep(path: &Path, sets: &[String], repeat: u32, measure: &str, out: Option<PathBuf>) -> Ended {
+    let refused = |reason: String| End(2, reason);
+    let mission = load(path)?;
+    let out = out.unwrap_or_else(|| PathBuf::from(format!("runs/sweep-{}", mission.name)));
+    let settings: Vec<Setting> =
+        sets.iter().map(|text| Setting::parse(text)).collect::<Result<_, _>>().map_err(refused)?;
+    let measure = index_of(measure).map_err(|reason| End(2, format!("--measure: {reason}")))?;
+    let plan = SweepPlan::new(&path.display().to_string(), mission, settings, repeat).map_err(refused)?;
+    let stop = StopFlag::on_signals();
+    stop.arm();
+    let mut progress = Count::new("sweeping", plan.cells.len() * plan.repeats as usize);
+    let swept = crate::sweep::sweep(&plan, &out, |over, _| {
+        progress.reach(over, "");
+        !stop.is_raised()
+    });
+    progress.done();
+    let swept = swept.map_err(|reason| End(4, reason))?;
+    if !swept.complete {
+        return Err(interrupted(&out));
+    }
+    let command: Vec<String> = std::env::args().skip(1).map(quoted).collect();
+    let command = format!("mission-control {}", command.join(" "));
+    crate::sweep::show(&plan, &swept, measure, &command, &out).map_err(|reason| End(4, reason))?;
+    bus::tell!(
+        "{} runs, {} of them new: {}",
+        swept.runs.len(),
+        swept.runs.len() - swept.found,
+        out.join("README.md").display()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn study(path: &Path, out: Option<PathBuf>) -> Ended {
+    let study = Study::read(path).map_err(|reason| End(2, reason))?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let out = out.unwrap_or_else(|| PathBuf::from(format!("runs/study-{stem}")));
+    let stop = StopFlag::on_signals();
+    stop.arm();
+    let mut progress = Count::new("sweeping", study.runs());
+    let command = format!("mission-control study {}", quoted(path.display().to_string()));
+    let complete = study.make(&out, &command, |over, _| {
+        progress.reach(over, "");
+        !stop.is_raised()
+    });
+    progress.done();
+    if !complete.map_err(|reason| End(4, reason))? {
+        return Err(interrupted(&out));
+    }
+    bus::tell!("{} runs: {}", study.runs(), out.join("README.md").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn interrupted(out: &Path) -> End {
+    End(1, format!("interrupted; {} keeps the runs that are over, and the same command goes on", out.display()))
+}
+
+/// A word of a command as a shell takes it.
+fn quoted(word: String) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
+    if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
 fn run_fleet(args: RunArgs) -> Ended {
@@ -377,8 +486,18 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
         bus::tell!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
         print_theory(&theory::rows(mission, Some(summary)));
         let m = &summary.fleet.messages;
+        let more: String = [
+            (m.out_of_range, "out of range"),
+            (m.half_duplex, "unheard while speaking"),
+            (m.collision, "collided"),
+            (m.corrupt, "corrupt"),
+        ]
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what} + "))
+        .collect();
         bus::tell!(
-            "  Messages: {} sent = {} delivered + {} lost + {} with the link down + {} with the queue full + {} in flight",
+            "  Messages: {} sent = {} delivered + {} lost + {} with the link down + {} with the queue full + {more}{} in flight",
             m.sent,
             m.delivered,
             m.lost,
@@ -386,6 +505,10 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
             m.queue_full,
             m.in_flight
         );
+        if m.copied + m.copy_dropped + m.copy_in_flight > 0 {
+            let (copied, dropped, in_flight) = (m.copied, m.copy_dropped, m.copy_in_flight);
+            bus::tell!("  Second copies: {copied} delivered, {dropped} dropped, {in_flight} in flight");
+        }
         bus::tell!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
         bus::tell!("report: {}", folder.join("report.html").display());
     }
@@ -437,20 +560,51 @@ fn stop(endpoint: &Endpoint) -> Ended {
     Ok(ExitCode::SUCCESS)
 }
 
+fn gallery(missions: &Path, out: &Path) -> Ended {
+    let gallery = Gallery::read(missions).map_err(|reason| End(2, reason))?;
+    let mut progress = Count::new("flying", gallery.missions());
+    let outcome = gallery.make(out, |name| progress.one_more(name));
+    progress.done();
+    let outcome = outcome.map_err(|reason| End(4, reason))?;
+    for name in &outcome.unused {
+        bus::remark!("warning: {name} is in no figure of {GALLERY}");
+    }
+    for fault in &outcome.faults {
+        bus::remark!("{fault}");
+    }
+    let agree = if outcome.faults.is_empty() { "all agree" } else { "not all agree" };
+    bus::tell!(
+        "{} figures, {} expected numbers, {agree}: {}",
+        outcome.figures,
+        outcome.expected,
+        out.join("index.html").display()
+    );
+    Ok(if outcome.faults.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
 fn report(run: &Path) -> Ended {
     folder::report(run, Vec::new()).map_err(|error| End(4, error))?;
     bus::tell!("report: {}", run.join("report.html").display());
     Ok(ExitCode::SUCCESS)
 }
 
-fn export(run: &Path, out: Option<PathBuf>) -> Ended {
+fn export(run: &Path, format: Format, out: Option<PathBuf>) -> Ended {
     let recording = folder::recording(run).map_err(|error| End(4, error))?;
     let beside = if run.is_dir() { run } else { run.parent().unwrap_or(Path::new(".")) };
     let out = out.unwrap_or_else(|| beside.to_path_buf());
     let failed = |error: std::io::Error| End(4, format!("cannot export to {}: {error}", out.display()));
     std::fs::create_dir_all(&out).map_err(failed)?;
-    export_csv(&recording.exact, &out).map_err(failed)?;
-    bus::tell!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
+    match format {
+        Format::Csv => {
+            export_csv(&recording.exact, &out).map_err(failed)?;
+            bus::tell!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
+        }
+        Format::Network => {
+            let path = out.join("network.toml");
+            std::fs::write(&path, network_section(&recording.exact)).map_err(failed)?;
+            bus::tell!("the network of {} rows to {}", recording.exact.len(), path.display());
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -82,3 +82,54 @@ impl Progress {
         }
     }
 }
+
+/// Progress through a number of things.
+pub struct Count {
+    bar: Option<ProgressBar>,
+    step: String,
+    reached: usize,
+    of: usize,
+    last_line: Instant,
+}
+
+impl Count {
+    /// Progress towards `of` things.
+    pub fn new(step: &str, of: usize) -> Count {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(of.max(1) as u64);
+            let style = ProgressStyle::with_template("{prefix:>10} [{bar:40}] {pos}/{len} {eta} {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+            bar.set_prefix(step.to_string());
+            bar
+        });
+        Count { bar, step: step.to_string(), reached: 0, of, last_line: Instant::now() }
+    }
+
+    /// One more is done.
+    pub fn one_more(&mut self, message: &str) {
+        self.reach(self.reached + 1, message);
+    }
+
+    /// So many are done.
+    pub fn reach(&mut self, count: usize, message: &str) {
+        self.reached = count;
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position(self.reached as u64);
+                bar.set_message(message.to_string());
+            }
+            None if self.last_line.elapsed() >= PLAIN_PERIOD => {
+                bus::remark!("{}: {} of {}  {message}", self.step, self.reached, self.of);
+                self.last_line = Instant::now();
+            }
+            None => {}
+        }
+    }
+
+    /// No more progress.
+    pub fn done(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,7 +1,9 @@
 //! The run folder: where a flight's files go, and how they come about.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use bus::recording::{Recording, read};
@@ -17,6 +19,27 @@ use crate::theory;
 pub const RECORDING: &str = "recording.mcap";
 /// The mission file as flown.
 pub const MISSION: &str = "mission.toml";
+
+/// Longest mission file (bytes).
+const MISSION_BYTES: u64 = 1 << 20;
+
+/// Reads and checks a mission file.
+///
+/// # Errors
+/// Why it cannot be read, or everything that is wrong with it.
+pub fn load(path: &Path) -> Result<Arc<Mission>, String> {
+    let unreadable = |error: std::io::Error| format!("cannot read the mission file {}: {error}", path.display());
+    let mut text = String::new();
+    let file = fs::File::open(path).map_err(unreadable)?;
+    file.take(MISSION_BYTES + 1).read_to_string(&mut text).map_err(unreadable)?;
+    if text.len() as u64 > MISSION_BYTES {
+        return Err(format!("the mission file {} is too long; allowed: {MISSION_BYTES} bytes", path.display()));
+    }
+    Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
+        let n = faults.list.len();
+        format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display())
+    })
+}
 
 /// A folder for a new run: `wanted`, or `runs/<mission>-<time>`.
 ///

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::graph::adversary::{Allowance, Signal, Signals};
+use common::mission::Mission;
 use common::mission::file::{
     FollowingChoice, FollowingType, IntervalSwitching, LawChoice, MissionFile, SwitchingChoice, UpInterval,
 };
-use common::mission::{Delay, Mission};
 use common::random::Stream;
 use common::record::{Record, Row};
 use common::theory::theorem_4_4::Coordination;
@@ -232,7 +232,7 @@ fn climb(
 /// messages that are neither late nor lost.
 fn promise(mission: &Mission, signals: &Signals, allowance: &Allowance) -> Option<(f64, f64)> {
     let LawChoice::Switching(law) = &mission.law_choice else { return None };
-    let at_once = mission.links.iter().all(|l| l.delay == Delay::Constant(Span::ZERO) && l.loss == 0.0);
+    let at_once = mission.every_message_takes(Span::ZERO) && mission.loses_by_switching_only();
     let as_told = mission
         .vehicles
         .iter()

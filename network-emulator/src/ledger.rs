@@ -1,4 +1,7 @@
 //! The ledger of a directed link: sent = delivered + dropped + in flight, at every instant.
+//!
+//! Copies that the network makes were sent by nobody. They have a ledger of their own, with the same equation: copies made
+//! = copies delivered + copies dropped + copies in flight.
 
 use common::record::Fate;
 
@@ -7,16 +10,13 @@ use common::record::Fate;
 pub struct Ledger {
     /// Taken from the sender.
     pub sent: u64,
-    /// Handed to the receiver.
-    pub delivered: u64,
-    /// Lost by the loss model.
-    pub lost: u64,
-    /// Arrived while the link was down.
-    pub link_down: u64,
-    /// Refused because too many were under way.
-    pub queue_full: u64,
-    /// Still under way.
+    /// Still waiting or under way.
     pub in_flight: u64,
+    /// Second copies made.
+    pub copies: u64,
+    /// Second copies still under way.
+    pub copies_in_flight: u64,
+    settled: [u64; Fate::ALL.len()],
 }
 
 impl Ledger {
@@ -26,26 +26,70 @@ impl Ledger {
         self.in_flight += 1;
     }
 
-    /// The fate of a message under way was decided.
+    /// A second copy was made of a message under way.
+    pub(crate) fn copy(&mut self) {
+        self.copies += 1;
+        self.copies_in_flight += 1;
+    }
+
+    /// The fate of a message or copy under way was decided.
     pub(crate) fn settle(&mut self, fate: Fate) {
-        let column = match fate {
-            Fate::Delivered => &mut self.delivered,
-            Fate::Lost => &mut self.lost,
-            Fate::LinkDown => &mut self.link_down,
-            Fate::QueueFull => &mut self.queue_full,
-            Fate::InFlight => return,
-        };
-        *column += 1;
-        self.in_flight -= 1;
+        match fate {
+            Fate::InFlight | Fate::CopyInFlight => return,
+            Fate::Copied | Fate::CopyDropped => self.copies_in_flight -= 1,
+            _ => self.in_flight -= 1,
+        }
+        self.settled[fate as usize] += 1;
+        debug_assert!(self.balances(), "{self:?}");
+    }
+
+    /// How many messages met this fate.
+    pub fn of(&self, fate: Fate) -> u64 {
+        match fate {
+            Fate::InFlight => self.in_flight,
+            Fate::CopyInFlight => self.copies_in_flight,
+            fate => self.settled[fate as usize],
+        }
+    }
+
+    /// Handed to the receiver.
+    pub fn delivered(&self) -> u64 {
+        self.of(Fate::Delivered)
     }
 
     /// Dropped for any cause.
     pub fn dropped(&self) -> u64 {
-        self.lost + self.link_down + self.queue_full
+        Fate::DROPS.iter().map(|cause| self.of(*cause)).sum()
     }
 
     /// Whether it adds up.
     pub fn balances(&self) -> bool {
-        self.sent == self.delivered + self.dropped() + self.in_flight
+        self.sent == self.delivered() + self.dropped() + self.in_flight
+            && self.copies == self.of(Fate::Copied) + self.of(Fate::CopyDropped) + self.copies_in_flight
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fate_is_a_number_of_its_own_and_a_drop_a_delivery_a_copy_or_under_way() {
+        for (number, fate) in Fate::ALL.into_iter().enumerate() {
+            assert_eq!(fate as usize, number);
+            let others = [Fate::Delivered, Fate::InFlight].contains(&fate) || fate.is_of_copy();
+            assert!(others ^ Fate::DROPS.contains(&fate), "{fate:?}");
+        }
+    }
+
+    #[test]
+    fn each_fate_balances() {
+        for fate in Fate::ALL {
+            let mut ledger = Ledger::default();
+            ledger.take();
+            ledger.copy();
+            ledger.settle(fate);
+            assert!(ledger.balances() && ledger.of(fate) == 1, "{fate:?}: {ledger:?}");
+        }
     }
 }

@@ -585,4 +585,92 @@ mod tests {
             })
             .expect("no garbage stops it");
     }
+
+    fn thesis(name: &str) -> String {
+        let path = format!("{}/../missions/thesis/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        std::fs::read_to_string(path).expect("a mission")
+    }
+
+    #[test]
+    fn each_law_puts_on_the_air_what_it_declares_and_no_more() {
+        for (name, scalar) in [
+            ("eq-1-5-leader-integral", false),
+            ("solution-1", true),
+            ("solution-2", false),
+            ("fig-3-7", true),
+            ("eq-3-62-weighted", false),
+            ("eq-3-70-pattern", true),
+            ("fig-3-10", false),
+            ("eq-3-83", false),
+            ("eq-3-86", false),
+            ("truly-decentralised", true),
+            ("ucm-one-link-at-a-time", false),
+            ("fig-4-2", false),
+            ("eq-4-59", false),
+            ("eq-4-62-example-4-1", false),
+        ] {
+            let mission = Arc::new(Mission::parse(name, &thesis(name)).unwrap_or_else(|faults| panic!("{faults}")));
+            for me in 0..mission.vehicles.len() {
+                let mut flight = Flight::new(mission.clone(), me, None).expect("flies");
+                flight.handle(Time::ZERO, None);
+                let sent: Vec<Vec<u8>> = outputs(&mut flight)
+                    .into_iter()
+                    .filter_map(|output| match output {
+                        FlightOutput::Transmit(bytes) => Some(bytes),
+                        _ => None,
+                    })
+                    .collect();
+                let [bytes] = &sent[..] else { panic!("{name}: {} messages", sent.len()) };
+                assert_eq!(bytes.len(), mission.message_bytes(), "{name}");
+                assert_eq!(CoordinationState::decode(bytes).expect("sound").scalar.is_some(), scalar, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn who_is_not_told_the_formation_speed_flies_the_same_whatever_it_is() {
+        // One vehicle with what it hears, at two formation speeds: what it says must be the same number by number.
+        let said = |name: &str, me: usize, heard: usize, replace: [&str; 2]| {
+            let text = thesis(name);
+            assert!(text.contains(replace[0]), "{name}");
+            let mission = Mission::parse(name, &text.replacen(replace[0], replace[1], 1));
+            let mission = Arc::new(mission.unwrap_or_else(|faults| panic!("{faults}")));
+            let mut flight = Flight::new(mission.clone(), me, None).expect("flies");
+            let words = (0..400u32).map(|seq| {
+                let made = Time::from_secs(0.02 * f64::from(seq));
+                let xi = 0.3 + 0.002 * f64::from(seq);
+                let scalar = mission.law.says().map(|_| 0.1);
+                let state = CoordinationState { mission: mission.digest, sender: heard as u16, seq, made, xi, scalar };
+                (made + mission.control_period, FlightInput::Heard(state.encode()))
+            });
+            let mut said = Vec::new();
+            flight.run_until(Time::from_secs(8.0), words, |_, output| said.extend(transmitted(&[output])));
+            said.iter().map(|state| (state.xi, state.scalar)).collect::<Vec<_>>()
+        };
+        let speeds = ["from_s = 0.0, speed = 0.1", "from_s = 0.0, speed = 0.4"];
+        let of = |me, heard| speeds.map(|speed| said("truly-decentralised", me, heard, [speeds[0], speed]));
+        let ([slow, fast], [told_slow, told_fast]) = (of(1, 2), of(0, 1));
+        assert!(slow.len() == 401 && slow == fast && told_slow != told_fast);
+        let speeds = ["\nspeed = 0.5", "\nspeed = 0.2"];
+        let of = |me, heard| speeds.map(|speed| said("eq-1-5-leader-integral", me, heard, [speeds[0], speed]));
+        let ([slow, fast], [told_slow, told_fast]) = (of(1, 0), of(0, 1));
+        assert!(slow.len() == 401 && slow == fast && told_slow != told_fast);
+    }
+
+    #[test]
+    fn a_pattern_that_moves_is_off_the_air() {
+        // h_2(0) = 0.5 sin 120°: the message holds ξ − h, the record ξ.
+        let mission = Arc::new(Mission::parse("m", &thesis("eq-3-70-pattern")).expect("sound"));
+        let mut flight = Flight::new(mission.clone(), 1, None).expect("flies");
+        flight.handle(Time::ZERO, None);
+        let outputs = outputs(&mut flight);
+        let h = 0.5 * 120f64.to_radians().sin();
+        let [said] = transmitted(&outputs)[..] else { panic!("one message") };
+        assert!((said.xi - (mission.vehicles[1].start.xi - h)).abs() < 1e-12);
+        let recorded = outputs.iter().find_map(|output| match output {
+            FlightOutput::Record(Row::Exact(Record::State(row))) => Some(row.xi),
+            _ => None,
+        });
+        assert_eq!(recorded, Some(mission.vehicles[1].start.xi));
+    }
 }

@@ -172,7 +172,7 @@ mod tests {
         let made = Time::from_secs(16.0);
         let state =
             CoordinationState { mission: mission.digest, sender: 0, seq: 1, made, xi: 10.0, scalar: Some(0.125) };
-        neighbours.hear(Time::from_secs(21.0), &state.encode()).expect("sound");
+        neighbours.hear(Time::from_secs(24.0), &state.encode()).expect("sound");
         let now = Time::from_secs(24.0);
         assert_eq!(neighbours.present(now, |scalar| scalar)[0].xi, 11.0);
         assert_eq!(neighbours.present(now, |scalar| scalar)[0].said, 10.0);

@@ -2,7 +2,7 @@
 //!
 //! Every field is named once here; a field that is added to a row does not compile until it is.
 
-use common::record::{AchievedRow, Fate, MessageRow, StateRow};
+use common::record::{AchievedRow, MessageRow, StateRow};
 
 /// Appends to a buffer.
 struct Object<'b> {
@@ -92,13 +92,6 @@ pub(super) fn state(row: &StateRow, json: &mut Vec<u8>) {
 /// Appends what became of a message.
 pub(super) fn message(row: &MessageRow, json: &mut Vec<u8>) {
     let MessageRow { t_ns, from, to, seq, sent_ns, due_ns, fate } = row;
-    let fate = match fate {
-        Fate::Delivered => "delivered",
-        Fate::Lost => "lost",
-        Fate::LinkDown => "link_down",
-        Fate::QueueFull => "queue_full",
-        Fate::InFlight => "in_flight",
-    };
     object(json)
         .integer("{\"t_ns\":", *t_ns)
         .text(",\"from\":", from)
@@ -106,7 +99,7 @@ pub(super) fn message(row: &MessageRow, json: &mut Vec<u8>) {
         .integer(",\"seq\":", *seq)
         .integer(",\"sent_ns\":", *sent_ns)
         .integer(",\"due_ns\":", *due_ns)
-        .text(",\"fate\":", fate)
+        .text(",\"fate\":", fate.as_str())
         .end();
 }
 
@@ -125,6 +118,7 @@ pub(super) fn achieved(row: &AchievedRow, json: &mut Vec<u8>) {
 
 #[cfg(test)]
 mod tests {
+    use common::record::Fate;
     use proptest::prelude::*;
 
     use super::*;
@@ -153,7 +147,7 @@ mod tests {
             };
             prop_assert_eq!(written(|json| state(&row, json)), serde_json::to_string(&row).expect("JSON"));
             let (from, to) = (from.as_str().into(), to.as_str().into());
-            let fate = [Fate::Delivered, Fate::Lost, Fate::LinkDown, Fate::QueueFull, Fate::InFlight][fate];
+            let fate = Fate::ALL[fate];
             let row = MessageRow { t_ns, from, to, seq, sent_ns: other_ns, due_ns: -t_ns.max(i64::MIN + 1), fate };
             prop_assert_eq!(written(|json| message(&row, json)), serde_json::to_string(&row).expect("JSON"));
             let MessageRow { from, to, .. } = row;

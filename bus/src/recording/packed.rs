@@ -14,7 +14,8 @@ use common::record::{ClockRecord, Fate, Name, Record, Row, Settled};
 /// A pack is handed on when it has this many bytes.
 pub(crate) const PACK: usize = 16 << 10;
 
-const FATES: [Fate; 5] = [Fate::Delivered, Fate::Lost, Fate::LinkDown, Fate::QueueFull, Fate::InFlight];
+/// Fates by their numbers.
+const FATES: [Fate; Fate::ALL.len()] = Fate::ALL;
 const LATENESS_FOLLOWS: u8 = 0x80;
 
 /// A pack in the making.
@@ -29,7 +30,7 @@ pub(crate) struct Pack {
 impl Pack {
     /// Adds what became of a message between these two.
     pub(crate) fn add(&mut self, settled: &Settled, from: usize, to: usize) {
-        let fate = FATES.iter().position(|fate| *fate == settled.fate).unwrap_or_default() as u8;
+        let fate = settled.fate as u8;
         let lateness = if settled.late_ns.is_some() { LATENESS_FOLLOWS } else { 0 };
         self.t_ns = if self.bytes.is_empty() { settled.t_ns } else { self.t_ns.min(settled.t_ns) };
         self.bytes.push(fate | lateness);
@@ -111,7 +112,7 @@ mod tests {
     use super::*;
 
     fn settled() -> impl Strategy<Value = (Settled, usize, usize)> {
-        let numbers = (any::<i64>(), any::<u64>(), any::<i64>(), any::<i64>(), 0usize..5, any::<Option<i64>>());
+        let numbers = (any::<i64>(), any::<u64>(), any::<i64>(), any::<i64>(), 0..FATES.len(), any::<Option<i64>>());
         (numbers, 0usize..3, 0usize..3).prop_map(|((t_ns, seq, sent_ns, due_ns, fate, late_ns), from, to)| {
             // The achieved row tells the delay, which must be a number.
             let due_ns = sent_ns.saturating_add((due_ns >> 1).max(0) % 1_000_000_000_000);

@@ -172,7 +172,7 @@ fn a_frozen_hub_is_lost_and_found_again() {
 
 #[test]
 fn a_line_that_the_next_hub_refuses_says_so_and_ends() {
-    let (first, _first_events) = hub();
+    let (mut first, _first_events) = hub();
     let endpoint = first.endpoint().clone();
     let (line, events) = line(&endpoint, "auv1");
     first.close();

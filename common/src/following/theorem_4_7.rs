@@ -335,6 +335,8 @@ impl Divisor {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::coordination::auxiliary_4_59::Auxiliary;
+    use crate::coordination::{Demand, FleetLaw, Neighbour, Own, SpeedReference, VehicleLaw};
     use crate::path::Path;
     use crate::random::Stream;
     use crate::vehicle::attitude::{from_yaw_pitch_roll, quaternion_rate, to_inertial};
@@ -535,6 +537,75 @@ pub(crate) mod tests {
             let solved = matrix.lu().solve(&right).expect("regular");
             let wanted = Vector3::new(at.input.thrust, state.spin.y - at.z_2[0], state.spin.z - at.z_2[1]);
             assert!((solved - wanted).norm() < 1e-12 * (1.0 + solved.norm()));
+        }
+    }
+
+    #[test]
+    fn alpha_2_alone_is_that_of_the_law_whatever_the_actual_rate() {
+        let mut random = Stream::new(50, "alpha_2");
+        for case in 0..50 {
+            let (closed, x) = random_loop(&mut random, TargetMotion::TypeII, 1.0);
+            let (state, rate, at) = closed.evaluate(&x);
+            let alone = closed.law.alpha_2(&state, &Helix::section_4_6(-10.0).at(x[13]), rate.nominal);
+            assert!((alone - at.alpha_2).abs() <= 1e-12 * (1.0 + alone.abs()), "case {case}: {alone} {}", at.alpha_2);
+        }
+    }
+
+    #[test]
+    fn coordination_and_path_following_share_a_lyapunov_function_that_falls() {
+        // V_c = ½θᵀθ + ½zᵀz + ΣW₃ with θᵀθ = γᵀLγ, under (4.59) and (4.60), where η and z go on as the law says:
+        // V̇_c = −ηᵀA₁η − zᵀA₂z − Σ(k_e eᵀM⁻¹e − eᵀδ + k_φ φᵀMφ + k_z z₂ᵀz₂), erratum 4.15.
+        let (a_1, a_2, v_l) = (3.0, 5.0, 0.4);
+        let law = Auxiliary::fixed(a_1, a_2).expect("positive");
+        let star: [&[usize]; 3] = [&[1], &[0, 2], &[1]];
+        let mut random = Stream::new(415, "V_c");
+        for case in 0..40 {
+            let fleet: Vec<(ClosedLoop, Loop)> = (0..3)
+                .map(|_| {
+                    let (mut closed, mut x) = random_loop(&mut random, TargetMotion::TypeII, 1.0);
+                    (closed.v_r, closed.v_n_dot, x[15]) = (v_l, 0.0, v_l);
+                    x[13] = random.uniform(70.0, 80.0);
+                    let there = Helix::section_4_6(-10.0).at(x[13]).p;
+                    x.fixed_rows_mut::<3>(0).copy_from(&(there + Vector3::from_fn(|_, _| random.uniform(-3.0, 3.0))));
+                    (closed, x)
+                })
+                .collect();
+            let (mut measured, mut expected) = (0.0, 0.0);
+            for (i, (closed, x)) in fleet.iter().enumerate() {
+                let (state, ..) = closed.evaluate(x);
+                let point = Helix::section_4_6(-10.0).at(x[13]);
+                let alpha_2 = closed.law.alpha_2(&state, &point, v_l);
+                let heard = star[i].iter().map(|&j| Neighbour { xi: fleet[j].1[13], ..Neighbour::default() });
+                let heard: Vec<Neighbour> = heard.collect();
+                let own = Own { xi: x[13], alpha_2, ..Own::default() };
+                let mut one = law.vehicle(i);
+                // Something in z, and then z itself: what it asks for when nothing drives it.
+                let rate_of = |one: &mut dyn VehicleLaw, own: &Own, heard: &[Neighbour]| match one.demand(
+                    SpeedReference::default(),
+                    own,
+                    heard,
+                ) {
+                    Demand::Rate(rate) => rate,
+                    other => panic!("{other:?}"),
+                };
+                let z_of = |one: &mut dyn VehicleLaw| rate_of(one, &Own::default(), &[]);
+                rate_of(one.as_mut(), &Own { xi: random.uniform(-9.0, 9.0), ..own }, &heard);
+                one.advance(0.5);
+                let z = z_of(one.as_mut());
+                let eta = rate_of(one.as_mut(), &own, &heard);
+                one.advance(1e-7);
+                let z_dot = (z_of(one.as_mut()) - z) / 1e-7;
+                let l_gamma: f64 = heard.iter().map(|j| x[13] - j.xi).sum();
+                let mut x = *x;
+                x[14] = eta;
+                measured += closed.derivative(&x, |x| closed.law.lyapunov(&closed.evaluate(x).2));
+                measured += l_gamma * (v_l + eta) + z * z_dot;
+                let (_, rate, at) = closed.evaluate(&x);
+                expected += -a_1 * eta * eta - a_2 * z * z;
+                expected += closed.law.lyapunov_rate_terms(&at, rate)[..4].iter().sum::<f64>();
+            }
+            let scale = 1.0 + expected.abs();
+            assert!((measured - expected).abs() < 1e-5 * scale, "case {case}: {measured} {expected}");
         }
     }
 

@@ -97,7 +97,7 @@ impl<'t> Locator<'t> {
 }
 
 /// Collects faults while a file is checked.
-pub(super) struct Collector<'t> {
+pub struct Collector<'t> {
     locator: Locator<'t>,
     list: Vec<Fault>,
 }
@@ -107,8 +107,8 @@ impl<'t> Collector<'t> {
         Collector { locator: Locator::new(text), list: Vec::new() }
     }
 
-    /// Notes a fault of a key.
-    pub(super) fn fault(&mut self, key: &str, found: impl fmt::Display, allowed: impl fmt::Display) {
+    /// Notes a fault of a key such as `vehicles[1].start.x_m`.
+    pub fn fault(&mut self, key: &str, found: impl fmt::Display, allowed: impl fmt::Display) {
         let line = self.locator.line(key);
         let (found, allowed) = (found.to_string(), allowed.to_string());
         let fault = Fault { line, key: key.to_string(), found, allowed };
@@ -123,18 +123,20 @@ impl<'t> Collector<'t> {
         self.list.push(Fault { line, key, found, allowed: String::new() });
     }
 
-    /// Notes a fault unless the number lies where it may.
-    pub(super) fn number(&mut self, key: &str, value: f64, ok: bool, allowed: &str) {
+    /// Notes a fault unless the number is finite and `ok`.
+    pub fn number(&mut self, key: &str, value: f64, ok: bool, allowed: &str) {
         if !(ok && value.is_finite()) {
             self.fault(key, value, allowed);
         }
     }
 
-    pub(super) fn positive(&mut self, key: &str, value: f64, unit: &str) {
+    /// Notes a fault unless the number is finite and above 0.
+    pub fn positive(&mut self, key: &str, value: f64, unit: &str) {
         self.number(key, value, value > 0.0, &format!("a finite number above 0 {unit}"));
     }
 
-    pub(super) fn finite(&mut self, key: &str, value: f64, unit: &str) {
+    /// Notes a fault unless the number is finite.
+    pub fn finite(&mut self, key: &str, value: f64, unit: &str) {
         self.number(key, value, true, &format!("a finite number {unit}"));
     }
 

@@ -4,7 +4,9 @@ mod build;
 mod check;
 mod fault;
 pub mod file;
+mod link;
 mod pattern;
+mod read;
 mod shape;
 mod speed;
 
@@ -12,8 +14,10 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
-pub use fault::{Fault, Faults};
+pub use fault::{Collector, Fault, Faults};
+pub use link::{Layer, Link};
 pub use pattern::{Pattern, PatternMotion, PatternPoint};
+pub use read::read;
 pub use shape::schema;
 pub use speed::SpeedProfile;
 
@@ -21,6 +25,7 @@ use crate::coordination::FleetLaw;
 use crate::craft::{Craft, Limits};
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
+use crate::network::Medium;
 use crate::path::Path;
 use crate::time::{Span, Time};
 use crate::vehicle::environment::{Disturbances, Environment};
@@ -66,6 +71,8 @@ pub struct Mission {
     pub switching: Switching,
     /// Most messages under way on one directed link.
     pub queue: usize,
+    /// The medium that all vehicles share, if messages take time to send or disturb one another.
+    pub medium: Option<Medium>,
 }
 
 /// One vehicle of a mission.
@@ -102,37 +109,6 @@ pub struct Start {
     pub xi: f64,
 }
 
-/// One directed link.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Link {
-    /// Index of the sender.
-    pub from: usize,
-    /// Index of the receiver.
-    pub to: usize,
-    /// Its delay.
-    pub delay: Delay,
-    /// Probability that a message is lost.
-    pub loss: f64,
-}
-
-/// Delay of a link.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Delay {
-    /// The same for every message.
-    Constant(Span),
-    /// Uniform between two bounds.
-    Uniform(Span, Span),
-}
-
-impl Delay {
-    /// The least it can be.
-    pub fn least(self) -> Span {
-        match self {
-            Delay::Constant(delay) | Delay::Uniform(delay, _) => delay,
-        }
-    }
-}
-
 /// First eight bytes of the SHA-256 of a mission file.
 pub fn digest(text: &str) -> u64 {
     let hash = Sha256::digest(text.as_bytes());
@@ -159,9 +135,25 @@ impl Mission {
         Graph::from_arcs(self.vehicles.len(), &arcs)
     }
 
-    /// The least delay of any link: nothing said now is heard earlier.
+    /// How far the channel can be decided ahead: nothing said now makes a difference to any arrival earlier than this.
+    ///
+    /// The least delay of any link; nothing at all if vehicles share a medium, for who speaks now may drown or replace
+    /// what is about to arrive or to go out.
     pub fn least_delay(&self) -> Span {
-        self.links.iter().map(|link| link.delay.least()).min().unwrap_or(Span::ZERO)
+        if self.medium.is_some() {
+            return Span::ZERO;
+        }
+        self.links.iter().map(Link::least_delay).min().unwrap_or(Span::ZERO)
+    }
+
+    /// Whether every message on every link takes exactly this long.
+    pub fn every_message_takes(&self, delay: Span) -> bool {
+        self.medium.is_none() && self.links.iter().all(|link| link.fixed_delay() == Some(delay))
+    }
+
+    /// Whether messages are lost by the switching of links only.
+    pub fn loses_by_switching_only(&self) -> bool {
+        self.medium.is_none() && !self.links.iter().any(Link::loses)
     }
 
     /// The delay τ that the law was told, if it takes one \[s\].
@@ -221,15 +213,9 @@ impl Mission {
 
     /// Size of one coordination message \[bytes\].
     pub fn message_bytes(&self) -> usize {
-        let state = crate::wire::state::CoordinationState {
-            mission: self.digest,
-            sender: 0,
-            seq: 0,
-            made: Time::ZERO,
-            xi: 0.0,
-            scalar: self.law.says().map(|_| 0.0),
-        };
-        state.encode().len()
+        let scalar = self.law.says().map(|_| 0.0);
+        let (mission, sender, seq, made, xi) = (self.digest, 0, 0, Time::ZERO, 0.0);
+        crate::wire::state::CoordinationState { mission, sender, seq, made, xi, scalar }.encode().len()
     }
 
     /// What surrounds a vehicle during its flight; `None` where nothing disturbs it.

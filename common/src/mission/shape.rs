@@ -1,6 +1,7 @@
-//! Compares a mission file with the schema of [`super::file::MissionFile`], so that every unknown or missing key and
-//! every value of a wrong type is found at once, each with its line and what is allowed there.
+//! Compares a file with the schema of what it is read into, so that every unknown or missing key and every value of a
+//! wrong type is found at once, each with its line and what is allowed there.
 
+use schemars::JsonSchema;
 use serde_json::Value;
 use toml::de::{DeTable, DeValue};
 
@@ -9,14 +10,18 @@ use super::file::MissionFile;
 
 /// JSON schema of the mission file, for editors and for the check itself.
 pub fn schema() -> Value {
-    let mut settings = schemars::generate::SchemaSettings::draft2020_12();
-    settings.inline_subschemas = true;
-    settings.into_generator().into_root_schema_for::<MissionFile>().to_value()
+    schema_of::<MissionFile>()
 }
 
-/// Notes every difference in shape between a file and the schema.
-pub(super) fn check_shape(faults: &mut Collector<'_>, root: &DeTable<'_>) {
-    table(faults, root, &schema(), "");
+fn schema_of<T: JsonSchema>() -> Value {
+    let mut settings = schemars::generate::SchemaSettings::draft2020_12();
+    settings.inline_subschemas = true;
+    settings.into_generator().into_root_schema_for::<T>().to_value()
+}
+
+/// Notes every difference in shape between a file and the schema of `T`.
+pub(super) fn check_shape<T: JsonSchema>(faults: &mut Collector<'_>, root: &DeTable<'_>) {
+    table(faults, root, &schema_of::<T>(), "");
 }
 
 fn table(faults: &mut Collector<'_>, found: &DeTable<'_>, schema: &Value, key: &str) {

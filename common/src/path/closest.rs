@@ -17,28 +17,32 @@ const REFINEMENTS: usize = 80;
 /// a circle seen from its centre, the first counts.
 pub fn closest_parameter(path: &dyn Path, position: Vector3<f64>, planar: bool) -> f64 {
     let weight = Vector3::new(1.0, 1.0, if planar { 0.0 } else { 1.0 });
+    let distance = |xi: f64| (path.at(xi).p - position).component_mul(&weight).norm_squared();
+    let (from, to) = path.search_range();
+    let cell = (to - from) / f64::from(SAMPLES);
+    let mut best = (f64::INFINITY, from);
+    for sample in 0..=SAMPLES {
+        let xi = from + f64::from(sample) * cell;
+        let found = distance(xi);
+        if found < best.0 {
+            best = (found, xi);
+        }
+    }
+
+    refine(path, position, weight, best.1, cell)
+}
+
+/// The minimum of the distance within `cell` of `xi`, where it has one: Newton's method, with bisection where it would
+/// leave the bracket.
+pub(super) fn refine(path: &dyn Path, position: Vector3<f64>, weight: Vector3<f64>, xi: f64, cell: f64) -> f64 {
     // f(ξ) = ½‖p − position‖², f' = (p − position)ᵀ p', f'' = p'ᵀp' + (p − position)ᵀ p''.
-    let offset = |xi: f64| (path.at(xi).p - position).component_mul(&weight);
     let slopes = |xi: f64| {
         let point = path.at(xi);
         let away = (point.p - position).component_mul(&weight);
         let d1 = point.d1.component_mul(&weight);
         (away.dot(&d1), d1.norm_squared() + away.dot(&point.d2))
     };
-
-    let (from, to) = path.search_range();
-    let cell = (to - from) / f64::from(SAMPLES);
-    let mut best = (f64::INFINITY, from);
-    for sample in 0..=SAMPLES {
-        let xi = from + f64::from(sample) * cell;
-        let distance = offset(xi).norm_squared();
-        if distance < best.0 {
-            best = (distance, xi);
-        }
-    }
-
-    // Newton's method, with bisection where it would leave the bracket.
-    let (mut low, mut high, mut xi) = (best.1 - cell, best.1 + cell, best.1);
+    let (mut low, mut high, mut xi) = (xi - cell, xi + cell, xi);
     for _ in 0..REFINEMENTS {
         let (slope, bend) = slopes(xi);
         if slope > 0.0 {

@@ -12,11 +12,12 @@
 //! | lines and arcs joined | Figures 3.7 and 3.8, Remark 3.8 | R_i constant on each segment | [`chain`] |
 //!
 //! What follows from p', p'' and p''' (R, heading, curvature) is in [`geometry`], the point closest to a vehicle in
-//! [`closest`], and what a law may ask of a path as a whole in [`shape`].
+//! [`closest`], the same followed under way in [`foot`], and what a law may ask of a path as a whole in [`shape`].
 
 pub mod chain;
 pub mod circle;
 pub mod closest;
+pub mod foot;
 pub mod geometry;
 pub mod helix;
 pub mod line;

@@ -2,7 +2,8 @@
 
 use kuva::plot::ScatterPlot;
 
-use super::figures::{Figure, Panel, colour, render};
+use super::drawing::{Panel, colour, render};
+use super::figures::Figure;
 
 /// A figure of one panel.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use common::record::{Fate, Record};
+use common::record::Record;
 
 /// Writes the tables of a recording into a folder, row by row.
 pub struct Exporter<W: Write> {
@@ -89,7 +89,7 @@ impl<W: Write> Exporter<W> {
                 &row.from,
                 &row.to,
                 row.seq,
-                fate(row.fate),
+                row.fate.as_str(),
             ))?,
             Record::Topology(row) => self.topology.serialize((seconds(row.t_ns), &row.from, &row.to, row.up))?,
             Record::Speed(_) | Record::Warning(_) => {}
@@ -126,22 +126,11 @@ pub(super) fn seconds(nanos: i64) -> String {
     format!("{sign}{whole}.{}", if digits.is_empty() { "0" } else { digits })
 }
 
-/// The name of a fate, the same as in the recording.
-pub(super) fn fate(fate: Fate) -> &'static str {
-    match fate {
-        Fate::Delivered => "delivered",
-        Fate::Lost => "lost",
-        Fate::LinkDown => "link_down",
-        Fate::QueueFull => "queue_full",
-        Fate::InFlight => "in_flight",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::results::testing::{fleet, state_row};
-    use common::record::{MessageRow, TopologyRow};
+    use common::record::{Fate, MessageRow, TopologyRow};
 
     fn exported(rows: &[Record]) -> [String; 3] {
         let mut exporter = Exporter::new(Vec::new(), Vec::new(), Vec::new()).expect("starts");

@@ -52,7 +52,7 @@ pub struct VehicleFacts {
 
 impl Facts {
     /// The symbol of the coordination state.
-    pub(super) fn symbol(&self) -> &str {
+    pub(crate) fn symbol(&self) -> &str {
         if self.symbol.is_empty() { "ξ" } else { &self.symbol }
     }
 }

@@ -6,22 +6,17 @@
 //! | `trajectories.svg` (in space) | (a) from above (b) third coordinate over time | Figure 4.2 |
 //! | `errors.svg` (in space) | (a) path-following errors (b) coordination errors, outages shaded | Figure 4.3 |
 //! | `rate.svg` | the norm of the coordination error, logarithmic, with the fitted and the guaranteed rate | |
-//!
-//! Of a long series two samples per pixel column are drawn, its smallest and its largest, so that no peak is lost.
-
-use std::fmt::Write as _;
 
 use bus::recording::Recording;
 use common::record::StateRow;
-use kuva::backend::svg::SvgBackend;
+use kuva::plot::LegendPosition;
 use kuva::plot::annotations::ShadedRegion;
-use kuva::plot::{LegendPosition, LinePlot, ScatterPlot};
-use kuva::render::figure::Figure as Grid;
 use kuva::render::layout::Layout;
-use kuva::render::plots::Plot;
-use kuva::render::theme::Theme;
 
 use super::Facts;
+use super::drawing::{
+    Drawing, OUTAGE, OUTAGE_LIMIT, PAPER, PLANNED, Panel, SAMPLES, colour, extremes, render, subscript,
+};
 use super::network::Network;
 use super::series::{Coordination, Track, tracks};
 use super::statistics::fit_exponential;
@@ -37,29 +32,6 @@ pub struct Figure {
     /// The picture.
     pub svg: String,
 }
-
-/// Colours of the paper, replaced by those of the page where a figure is shown inside one. No other element of a
-/// figure has them.
-pub(super) const PAPER: &str = "#fffffe";
-/// Colour of text and axes.
-pub(super) const INK: &str = "#1b1f24";
-/// Colour of the grid.
-pub(super) const GRID: &str = "#e6e8eb";
-
-/// Series colours that are told apart by the colour-blind, on light and on dark paper (after Okabe and Ito).
-const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d31"];
-const PLANNED: &str = "#9aa0a6";
-const OUTAGE: &str = "#8a9099";
-
-/// Samples of a drawn series.
-const SAMPLES: usize = 600;
-/// More series than this have no legend: it would hide them.
-const LEGEND_LIMIT: usize = 8;
-/// More outages than this are not shaded: they would be one grey area.
-const OUTAGE_LIMIT: usize = 60;
-
-const WIDTH: f64 = 520.0;
-const HEIGHT: f64 = 360.0;
 
 /// The figures of a run.
 pub fn figures(recording: &Recording, facts: &Facts) -> Vec<Figure> {
@@ -79,77 +51,6 @@ struct View<'a> {
     coordination: Coordination,
     outages: Vec<(f64, f64)>,
 }
-
-/// One panel under construction.
-#[derive(Default)]
-pub(super) struct Panel {
-    pub(super) plots: Vec<Plot>,
-    /// Every point that is drawn, to place the legend where there are few.
-    pub(super) drawn: Vec<(f64, f64)>,
-    /// Names in the legend.
-    pub(super) names: Vec<String>,
-}
-
-impl Panel {
-    pub(super) fn line(&mut self, points: Vec<(f64, f64)>, style: impl FnOnce(LinePlot) -> LinePlot) {
-        self.drawn.extend(&points);
-        self.plots.push(style(LinePlot::new().with_data(points)).into());
-    }
-
-    /// A line of its own colour with a name.
-    fn series(&mut self, points: Vec<(f64, f64)>, index: usize, name: &str) {
-        self.names.push(name.to_owned());
-        self.line(points, |line| line.with_color(colour(index)).with_stroke_width(1.5).with_legend(name));
-    }
-
-    fn dot(&mut self, at: (f64, f64), colour: &str, size: f64) {
-        self.plots.push(ScatterPlot::new().with_data([at]).with_color(colour).with_size(size).into());
-    }
-
-    pub(super) fn layout(&self, title: &str, x_label: &str, y_label: &str) -> Layout {
-        let mut layout = Layout::auto_from_plots(&self.plots)
-            .with_title(title)
-            .with_x_label(x_label)
-            .with_y_label(y_label)
-            .with_x_label_offset(0.0, -6.0)
-            .with_theme(theme())
-            .with_box_axes()
-            .with_legend_position(self.emptiest_corner())
-            .with_title_size(15)
-            .with_label_size(13)
-            .with_tick_size(11)
-            .with_body_size(12);
-        // A legend of fifty names would hide what it explains.
-        layout.show_legend = (2..=LEGEND_LIMIT).contains(&self.names.len());
-        layout
-    }
-
-    /// The corner in which a legend hides the fewest points; the top right if there are several.
-    fn emptiest_corner(&self) -> LegendPosition {
-        let range = |value: fn(&(f64, f64)) -> f64| {
-            let values = || self.drawn.iter().map(value);
-            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
-        };
-        let ((left, right), (bottom, top)) = (range(|point| point.0), range(|point| point.1));
-        let longest = self.names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
-        let width = (0.13 + 0.016 * longest) * (right - left);
-        let height = (0.1 + 0.07 * self.names.len() as f64) * (top - bottom);
-        let corners = [
-            (LegendPosition::InsideTopRight, right - width, right, top - height, top),
-            (LegendPosition::InsideBottomRight, right - width, right, bottom, bottom + height),
-            (LegendPosition::InsideTopLeft, left, left + width, top - height, top),
-            (LegendPosition::InsideBottomLeft, left, left + width, bottom, bottom + height),
-        ];
-        let hidden = |corner: &(LegendPosition, f64, f64, f64, f64)| {
-            let (_, left, right, bottom, top) = corner;
-            self.drawn.iter().filter(|(x, y)| (*left..=*right).contains(x) && (*bottom..=*top).contains(y)).count()
-        };
-        corners.iter().min_by_key(|corner| hidden(corner)).map_or(LegendPosition::InsideTopRight, |corner| corner.0)
-    }
-}
-
-/// A panel that can be drawn.
-type Drawing = (Vec<Plot>, Layout);
 
 impl View<'_> {
     fn planar(&self) -> Vec<Figure> {
@@ -198,7 +99,7 @@ impl View<'_> {
         let end = points[points.len() - 1].0;
         let lowest = points.iter().fold(f64::INFINITY, |low, point| low.min(point.1));
         let mut panel = Panel::default();
-        panel.series(extremes(points), 0, "measured");
+        panel.series(extremes(points, SAMPLES), 0, "measured");
         let fit = fit_exponential(t_s, &norm, self.facts.link_period_s);
         if let Some(fit) = fit {
             let at = t_s.partition_point(|time| *time < fit.from_s).min(norm.len() - 1);
@@ -275,7 +176,7 @@ impl View<'_> {
     fn over_time(&self, title: &str, label: &str, value: impl Fn(&StateRow) -> f64) -> Drawing {
         let mut panel = Panel::default();
         for (index, track) in self.tracks.iter().enumerate() {
-            let points = extremes(track.rows.iter().map(|row| (row.t_ns as f64 / 1e9, value(row))).collect());
+            let points = extremes(track.rows.iter().map(|row| (row.t_ns as f64 / 1e9, value(row))).collect(), SAMPLES);
             panel.series(points, index, track.id);
         }
         let layout = self.time_axis(panel.layout(title, "time [s]", label));
@@ -290,7 +191,8 @@ impl View<'_> {
             None => (&[][..], &[][..]),
         };
         for (index, other) in others.iter().enumerate() {
-            let points = extremes(t_s.iter().zip(first.iter().zip(other)).map(|(t, (a, b))| (*t, a - b)).collect());
+            let points =
+                extremes(t_s.iter().zip(first.iter().zip(other)).map(|(t, (a, b))| (*t, a - b)).collect(), SAMPLES);
             panel.series(points, index + 1, &format!("{symbol}₁ − {symbol}{}", subscript(index + 2)));
         }
         if let Some((rate, height)) = self.envelope() {
@@ -320,77 +222,11 @@ impl View<'_> {
     }
 }
 
-pub(super) fn colour(index: usize) -> &'static str {
-    COLOURS[index % COLOURS.len()]
-}
-
-fn subscript(number: usize) -> String {
-    number.to_string().chars().filter_map(|digit| char::from_u32('₀' as u32 + digit.to_digit(10)?)).collect()
-}
-
-fn theme() -> Theme {
-    Theme {
-        background: PAPER.into(),
-        axis_color: INK.into(),
-        grid_color: GRID.into(),
-        tick_color: INK.into(),
-        text_color: INK.into(),
-        legend_bg: PAPER.into(),
-        legend_border: GRID.into(),
-        font_family: Some("Helvetica, Arial, DejaVu Sans, sans-serif".into()),
-        ..Theme::light()
-    }
-}
-
-pub(super) fn render(name: &str, rows: usize, columns: usize, panels: Vec<Drawing>) -> String {
-    let (plots, layouts) = panels.into_iter().unzip();
-    let width = if columns == 1 { 1.6 * WIDTH } else { WIDTH };
-    let grid = Grid::new(rows, columns).with_plots(plots).with_layouts(layouts).with_cell_size(width, HEIGHT);
-    renumbered(&SvgBackend::new().render_scene(&grid.render()), name)
-}
-
-/// The library numbers the clip paths of a whole process. Here they are numbered within the figure, so that the same
-/// run gives the same bytes, and named after it, so that figures can share a page.
-fn renumbered(svg: &str, name: &str) -> String {
-    const CLIP: &str = "kuva-clip-";
-    let mut numbers: Vec<&str> = Vec::new();
-    let mut parts = svg.split(CLIP);
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let (number, rest) = part.split_at(part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len()));
-        let index = numbers.iter().position(|known| *known == number).unwrap_or_else(|| {
-            numbers.push(number);
-            numbers.len() - 1
-        });
-        let _ = write!(text, "{name}-clip-{index}{rest}");
-    }
-    text
-}
-
-/// Smallest and largest sample of each of some hundred stretches of a series, in order of time.
-fn extremes(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= SAMPLES {
-        return points;
-    }
-    let stretches = SAMPLES / 2;
-    let mut kept = Vec::with_capacity(SAMPLES + 2);
-    kept.push(points[0]);
-    for stretch in 0..stretches {
-        let part = &points[points.len() * stretch / stretches..points.len() * (stretch + 1) / stretches];
-        let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
-        let (Some(low), Some(high)) = (part.iter().min_by(by_value), part.iter().max_by(by_value)) else { continue };
-        let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
-        kept.extend([*first, *second]);
-    }
-    kept.extend(points.last());
-    kept.dedup();
-    kept
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::results::VehicleFacts;
+    use crate::results::drawing::renumbered;
     use crate::results::testing::{facts, fleet, state_row};
     use common::record::Record;
 
@@ -433,29 +269,5 @@ mod tests {
             renumbered("a kuva-clip-17 b kuva-clip-4 c kuva-clip-17", "run"),
             "a run-clip-0 b run-clip-1 c run-clip-0"
         );
-    }
-
-    #[test]
-    fn a_legend_goes_where_the_lines_are_not() {
-        let mut panel = Panel::default();
-        panel.series((0..100).map(|step| (f64::from(step), f64::from(step))).collect(), 0, "rising");
-        assert!(matches!(panel.emptiest_corner(), LegendPosition::InsideBottomRight));
-        let mut panel = Panel::default();
-        panel.series((0..100).map(|step| (f64::from(step), -f64::from(step))).collect(), 0, "falling");
-        assert!(matches!(panel.emptiest_corner(), LegendPosition::InsideTopRight));
-    }
-
-    #[test]
-    fn no_peak_is_lost_by_thinning() {
-        let mut points: Vec<(f64, f64)> = (0..10_000).map(|step| (f64::from(step), 0.0)).collect();
-        points[4321].1 = 5.0;
-        let kept = extremes(points);
-        assert!(kept.len() <= SAMPLES + 2 && kept.contains(&(4321.0, 5.0)));
-        assert!(kept.is_sorted_by(|a, b| a.0 < b.0));
-    }
-
-    #[test]
-    fn subscripts_have_all_digits() {
-        assert_eq!(subscript(120), "₁₂₀");
     }
 }

@@ -12,17 +12,19 @@
 
 mod chart;
 mod diff;
+pub(crate) mod drawing;
 mod export;
 mod facts;
 mod figures;
 mod folder;
-mod network;
-mod report;
+pub(crate) mod network;
+pub(crate) mod report;
 mod series;
-mod statistics;
+pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
+mod trace;
 
 pub use chart::{Chart, Curve};
 pub use diff::{Outcome, Side, diff, origins_differ};
@@ -38,3 +40,4 @@ pub use summary::{
     ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
     Summary, VehicleSummary, summarise, summarise_clock,
 };
+pub use trace::network_section;

@@ -25,15 +25,29 @@ pub struct LinkSummary {
     pub link_down: u64,
     /// Dropped because the queue was full.
     pub queue_full: u64,
+    /// Dropped because the receiver was too far away.
+    pub out_of_range: u64,
+    /// Dropped because the receiver was speaking itself.
+    pub half_duplex: u64,
+    /// Dropped because another message arrived at the same time.
+    pub collision: u64,
+    /// Handed over with a flipped bit, and dropped by the receiver.
+    pub corrupt: u64,
     /// Under way when the mission ended.
     pub in_flight: u64,
+    /// Second copies handed to the receiver; they do not count as sent.
+    pub copied: u64,
+    /// Second copies that did not get there.
+    pub copy_dropped: u64,
+    /// Second copies under way when the mission ended.
+    pub copy_in_flight: u64,
     /// Sequence numbers between the first and the last of a sender's life that have no row.
     pub missing: u64,
     /// Messages with more than one row.
     pub repeated: u64,
     /// Whether every message has one fate: sent = delivered + dropped + in flight, none missing, none repeated.
     pub balanced: bool,
-    /// Size of what was delivered \[bytes\].
+    /// Size of what was delivered, without copies \[bytes\].
     pub delivered_bytes: u64,
     /// Commanded delay of what was delivered \[s\].
     pub delay: Option<Spread>,
@@ -93,7 +107,9 @@ pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<L
 
 fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
     let count = |fate| rows.iter().filter(|row| row.fate == fate).count() as u64;
-    let mut in_order: Vec<(i64, u64)> = rows.iter().map(|row| (row.sent_ns, row.seq)).collect();
+    // Copies were sent by nobody: they have no part in the ledger of what was sent.
+    let sent = rows.iter().filter(|row| !row.fate.is_of_copy());
+    let mut in_order: Vec<(i64, u64)> = sent.map(|row| (row.sent_ns, row.seq)).collect();
     in_order.sort_unstable();
     let (mut missing, mut repeated) = (0, 0);
     for pair in in_order.windows(2) {
@@ -108,19 +124,27 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
         rows.iter().filter(|row| row.fate == Fate::Delivered).map(|row| (row.due_ns - row.sent_ns) as f64 / 1e9);
     let delivered = count(Fate::Delivered);
     let summary = LinkSummary {
-        sent: rows.len() as u64 - repeated,
+        sent: in_order.len() as u64 - repeated,
         delivered,
         lost: count(Fate::Lost),
         link_down: count(Fate::LinkDown),
         queue_full: count(Fate::QueueFull),
         in_flight: count(Fate::InFlight),
+        out_of_range: count(Fate::OutOfRange),
+        half_duplex: count(Fate::HalfDuplex),
+        collision: count(Fate::Collision),
+        corrupt: count(Fate::Corrupt),
+        copied: count(Fate::Copied),
+        copy_dropped: count(Fate::CopyDropped),
+        copy_in_flight: count(Fate::CopyInFlight),
         missing,
         repeated,
         delivered_bytes: delivered * message_bytes,
         delay: Spread::of(&delays.collect::<Vec<_>>()),
         ..LinkSummary::default()
     };
-    let accounted = summary.delivered + summary.lost + summary.link_down + summary.queue_full + summary.in_flight;
+    let dropped: u64 = Fate::DROPS.iter().map(|cause| count(*cause)).sum();
+    let accounted = summary.delivered + dropped + summary.in_flight;
     LinkSummary { balanced: summary.sent == accounted && missing == 0 && repeated == 0, ..summary }
 }
 
@@ -367,6 +391,28 @@ mod tests {
         assert_eq!((link.sent, link.delivered, link.delivered_bytes), (6, 2, 20));
         assert_eq!(link.delay, Some(Spread { median: 5.0, p99: 5.0, max: 5.0 }));
         assert_eq!(transmissions(&rows), 6);
+    }
+
+    #[test]
+    fn each_cause_is_counted_and_copies_were_sent_by_nobody() {
+        let mut rows: Vec<Record> =
+            Fate::DROPS.into_iter().zip(0..).map(|(fate, seq)| message(seq, seq as i64, fate)).collect();
+        for fate in [Fate::Copied, Fate::CopyDropped, Fate::CopyInFlight] {
+            rows.push(message(3, 3, fate));
+        }
+        let link = link_1_2(&rows);
+        let causes = [
+            link.lost,
+            link.out_of_range,
+            link.link_down,
+            link.queue_full,
+            link.half_duplex,
+            link.collision,
+            link.corrupt,
+        ];
+        assert_eq!(causes, [1; 7]);
+        assert_eq!((link.copied, link.copy_dropped, link.copy_in_flight), (1, 1, 1));
+        assert_eq!((link.sent, link.delivered, link.repeated, link.balanced), (7, 0, 0, true));
     }
 
     #[test]

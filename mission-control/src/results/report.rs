@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::figures::{GRID, INK, PAPER};
+use super::drawing::{GRID, INK, PAPER};
 use super::summary::PATH_THRESHOLD_M;
 use super::{ClockSummary, Facts, Figure, LinkSummary, Summary, VehicleSummary};
 
@@ -241,42 +241,44 @@ fn network(page: &mut String, report: &Report<'_>) {
         return;
     }
     page.push_str("<section>\n<h2>Network</h2>\n");
-    let header = [
-        "link",
-        "sent",
-        "delivered",
-        "lost",
-        "link down",
-        "queue full",
-        "in flight",
-        "delay [s]",
-        "up",
-        "longest outage [s]",
-        "ledger",
-    ];
+    let totals = &report.summary.fleet.messages;
+    // What can always happen has a column, the rest only where it did.
+    type Column = (&'static str, fn(&LinkSummary) -> u64, u64, bool);
+    let columns: Vec<Column> = [
+        ("sent", (|link| link.sent) as fn(&LinkSummary) -> u64, totals.sent, true),
+        ("delivered", |link| link.delivered, totals.delivered, true),
+        ("lost", |link| link.lost, totals.lost, true),
+        ("out of range", |link| link.out_of_range, totals.out_of_range, false),
+        ("link down", |link| link.link_down, totals.link_down, true),
+        ("queue full", |link| link.queue_full, totals.queue_full, true),
+        ("deaf while speaking", |link| link.half_duplex, totals.half_duplex, false),
+        ("collided", |link| link.collision, totals.collision, false),
+        ("corrupt", |link| link.corrupt, totals.corrupt, false),
+        ("in flight", |link| link.in_flight, totals.in_flight, true),
+        ("second copies", |link| link.copied, totals.copied, false),
+    ]
+    .into_iter()
+    .filter(|(_, _, total, always)| *always || *total > 0)
+    .collect();
+    let mut header = vec!["link"];
+    header.extend(columns.iter().map(|column| column.0));
+    header.extend(["delay [s]", "up", "longest outage [s]", "ledger"]);
     let row = |link: &LinkSummary| {
         let ledger =
             if link.balanced { "<span class=\"yes\">balanced</span>" } else { "<span class=\"no\">open</span>" };
-        vec![
-            format!("{}&nbsp;→&nbsp;{}", escape(&link.from), escape(&link.to)),
-            link.sent.to_string(),
-            link.delivered.to_string(),
-            link.lost.to_string(),
-            link.link_down.to_string(),
-            link.queue_full.to_string(),
-            link.in_flight.to_string(),
+        let mut cells = vec![format!("{}&nbsp;→&nbsp;{}", escape(&link.from), escape(&link.to))];
+        cells.extend(columns.iter().map(|column| column.1(link).to_string()));
+        cells.extend([
             optional(link.delay.map(|delay| delay.median), ""),
             percent(link.up_fraction),
             number(link.longest_outage_s),
             ledger.into(),
-        ]
+        ]);
+        cells
     };
-    let totals = &report.summary.fleet.messages;
     let sum = (links.len() > 1).then(|| {
-        let counts =
-            [totals.sent, totals.delivered, totals.lost, totals.link_down, totals.queue_full, totals.in_flight];
         let mut cells = vec!["all".to_owned()];
-        cells.extend(counts.map(|count| count.to_string()));
+        cells.extend(columns.iter().map(|column| column.2.to_string()));
         cells.extend(["", "", "", ""].map(str::to_owned));
         cells
     });
@@ -357,7 +359,7 @@ fn reproduce(page: &mut String, report: &Report<'_>) {
 }
 
 /// A table that scrolls sideways on a narrow screen. Cells are HTML already.
-fn table(page: &mut String, class: &str, header: &[&str], rows: impl Iterator<Item = Vec<String>>) {
+pub(crate) fn table(page: &mut String, class: &str, header: &[&str], rows: impl Iterator<Item = Vec<String>>) {
     let _ = write!(page, "<div class=\"scroll\"><table class=\"{class}\">\n<thead><tr>");
     for cell in header {
         let _ = write!(page, "<th>{}</th>", escape(cell));
@@ -389,7 +391,7 @@ fn inline(svg: &str) -> String {
 }
 
 /// Text that means itself in HTML.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -413,7 +415,7 @@ fn percent(part: f64) -> String {
 }
 
 /// A number with three or four significant digits, as HTML.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let magnitude = value.abs();
     let minus = if value < 0.0 { "−" } else { "" };
     if magnitude == 0.0 {
@@ -430,7 +432,7 @@ fn number(value: f64) -> String {
     format!("{minus}{text}")
 }
 
-const STYLE: &str = include_str!("report.css");
+pub(crate) const STYLE: &str = include_str!("report.css");
 
 #[cfg(test)]
 mod tests {

@@ -76,7 +76,7 @@ pub fn fit_exponential(times: &[f64], norms: &[f64], period: Option<f64>) -> Opt
 }
 
 /// Where the last fifth of a series begins, rounded to whole periods of the network if it has some.
-pub(super) fn steady_from(end_s: f64, start_s: f64, period: Option<f64>) -> f64 {
+pub(crate) fn steady_from(end_s: f64, start_s: f64, period: Option<f64>) -> f64 {
     let fifth = (end_s - start_s) / 5.0;
     let length = match period {
         Some(period) if period > 0.0 && period <= (end_s - start_s) / 2.0 => (fifth / period).floor().max(1.0) * period,
@@ -86,31 +86,31 @@ pub(super) fn steady_from(end_s: f64, start_s: f64, period: Option<f64>) -> f64 
 }
 
 /// The values in ascending order.
-pub(super) fn sorted(values: &[f64]) -> Vec<f64> {
+pub(crate) fn sorted(values: &[f64]) -> Vec<f64> {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
     values
 }
 
 /// The value below which a part `q` of ascending values lies (nearest rank); `None` if there are none.
-pub(super) fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
+pub(crate) fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
     let rank = (q * ascending.len() as f64).ceil() as usize;
     ascending.get(rank.saturating_sub(1).min(ascending.len().saturating_sub(1))).copied()
 }
 
 /// Root of the mean square; 0 if there are no values.
-pub(super) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|value| value * value)).sqrt()
 }
 
 /// The mean; 0 if there are no values.
-pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
     if count == 0 { 0.0 } else { sum / count as f64 }
 }
 
 /// The largest value; 0 if there are no values (for magnitudes, which are never negative).
-pub(super) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, f64::max)
 }
 

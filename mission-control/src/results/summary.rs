@@ -116,8 +116,22 @@ pub struct MessageTotals {
     pub link_down: u64,
     /// Dropped because a queue was full.
     pub queue_full: u64,
+    /// Dropped because the receiver was too far away.
+    pub out_of_range: u64,
+    /// Dropped because the receiver was speaking itself.
+    pub half_duplex: u64,
+    /// Dropped because another message arrived at the same time.
+    pub collision: u64,
+    /// Handed over with a flipped bit, and dropped by the receiver.
+    pub corrupt: u64,
     /// Under way at the end.
     pub in_flight: u64,
+    /// Second copies handed to the receiver; they do not count as sent.
+    pub copied: u64,
+    /// Second copies that did not get there.
+    pub copy_dropped: u64,
+    /// Second copies under way when the mission ended.
+    pub copy_in_flight: u64,
     /// Transmissions: a message to several receivers goes on the air once.
     pub transmissions: u64,
     /// Size of one message \[bytes\].
@@ -381,6 +395,13 @@ fn totals(links: &[LinkSummary], transmissions: u64, message_bytes: u64) -> Mess
         link_down: sum(|link| link.link_down),
         queue_full: sum(|link| link.queue_full),
         in_flight: sum(|link| link.in_flight),
+        out_of_range: sum(|link| link.out_of_range),
+        half_duplex: sum(|link| link.half_duplex),
+        collision: sum(|link| link.collision),
+        corrupt: sum(|link| link.corrupt),
+        copied: sum(|link| link.copied),
+        copy_dropped: sum(|link| link.copy_dropped),
+        copy_in_flight: sum(|link| link.copy_in_flight),
         transmissions,
         message_bytes,
         bytes_on_air: transmissions * message_bytes,

@@ -8,7 +8,7 @@ use common::record::{
 
 use super::{Facts, VehicleFacts};
 
-pub(super) fn state_row(t_ns: i64, vehicle: &str, xi: f64) -> StateRow {
+pub(crate) fn state_row(t_ns: i64, vehicle: &str, xi: f64) -> StateRow {
     StateRow {
         t_ns,
         vehicle: vehicle.into(),

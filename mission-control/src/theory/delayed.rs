@@ -1,6 +1,6 @@
 //! Coordination with late information, (4.34) and (4.42).
 
-use common::mission::Delay;
+use common::mission::Mission;
 use common::mission::file::{Delayed, LawChoice};
 use common::theory::delay::{self, DelayGains};
 use common::theory::delay_rate;
@@ -17,7 +17,7 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
     let verdict = delay::verdict(DelayGains::Averaged(law.gain), tau, v_l, in_mean);
     let bears_losses = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_));
     let always_heard = bears_losses || network.leaves_nobody_alone();
-    let told = mission.links.iter().all(|link| told_truly(link.delay, law.delay_s) && link.loss == 0.0);
+    let told = told_truly(mission, law.delay_s) && mission.loses_by_switching_only();
     let holds = verdict.holds && always_heard && told;
     let mut value = verdict.value.clone();
     if !always_heard {
@@ -47,6 +47,6 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
 }
 
 /// Whether the law was told the delay that the link has.
-pub(super) fn told_truly(delay: Delay, tau: f64) -> bool {
-    delay == Delay::Constant(Span::from_secs(tau))
+pub(super) fn told_truly(mission: &Mission, tau: f64) -> bool {
+    mission.every_message_takes(Span::from_secs(tau))
 }

@@ -65,7 +65,7 @@ fn row(case: &Case<'_>, verdict: Verdict) -> TheoryRow {
 }
 
 /// R_i of every vehicle, if none changes along the path that is to be flown.
-fn constant_r(mission: &Mission) -> Option<Vec<f64>> {
+pub(super) fn constant_r(mission: &Mission) -> Option<Vec<f64>> {
     let way = mission.speed.distance(mission.end);
     let of = |vehicle: &common::mission::VehiclePlan| {
         let at = |i: u32| vehicle.path.at(vehicle.start.xi + way * f64::from(i) / f64::from(POINTS)).r();

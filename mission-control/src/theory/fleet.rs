@@ -108,7 +108,7 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
         name: name.into(),
         condition,
         value,
-        holds: mission.law_delay().map(|tau| mission.links.iter().all(|link| told_truly(link.delay, tau))),
+        holds: mission.law_delay().map(|tau| told_truly(mission, tau)),
         predicted: format!("{:.5} 1/s", excited.unwrap_or(mission.nominal_factor() * v_l)),
         measured: case.measured(|s| format!("{:.5} 1/s", s.fleet.steady_speed)),
         ..TheoryRow::default()

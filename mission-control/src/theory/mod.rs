@@ -9,6 +9,7 @@
 //! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
 //! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
 //! | solutions I to III | Propositions 3.4, 3.5 | `solutions.rs` |
+//! | weighted links, moving pattern | Remark 3.10, section 3.3.3 | `weights_and_patterns.rs` |
 //! | one-way links, one told vehicle | Propositions 3.6, 3.7, Remark 3.13 | `directed.rs` |
 //! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
 //! | switching networks | Theorems 4.4, 4.5 | `switching.rs` |
@@ -28,6 +29,7 @@ mod network;
 mod solutions;
 mod switching;
 mod watched;
+mod weights_and_patterns;
 
 use common::mission::Mission;
 use common::mission::file::LawChoice;
@@ -130,8 +132,8 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
         }
         LawChoice::Solution2(law) => solutions::rows(case, Law::SolutionTwo { a: law.a, b: law.b }),
         LawChoice::Solution3(law) => solutions::rows(case, Law::SolutionThree { a: law.a, b: law.b }),
-        LawChoice::Weighted(_) => solutions::rows_with_weights(case),
-        LawChoice::MovingPattern(_) => solutions::rows_of_a_moving_pattern(case),
+        LawChoice::Weighted(_) => weights_and_patterns::rows_of_weights(case),
+        LawChoice::MovingPattern(_) => weights_and_patterns::rows_of_a_pattern(case),
         LawChoice::Directed(law) => directed::rows(case, law.a, law.b),
         LawChoice::TrulyDecentralised(law) => directed::rows_of_a_told_vehicle(case, law),
         LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),

@@ -2,7 +2,7 @@
 
 use common::graph::Graph;
 use common::graph::measure::Connectivity;
-use common::mission::{Delay, Mission};
+use common::mission::Mission;
 use common::time::{Span, Time};
 
 /// Changes of a switching signal looked at when its graphs are collected.
@@ -50,7 +50,7 @@ impl Network {
             planned: Connectivity::planned(mission.switching.clone(), n, &arcs, mission.end),
             graphs,
             up,
-            immediate: mission.links.iter().all(|l| l.delay == Delay::Constant(Span::ZERO) && l.loss == 0.0),
+            immediate: mission.every_message_takes(Span::ZERO) && mission.loses_by_switching_only(),
         }
     }
 

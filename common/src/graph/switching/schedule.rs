@@ -36,15 +36,17 @@ impl Schedule {
         }
         let mut calendars = vec![calendar(intervals.iter().filter(|interval| interval.links.is_none()), repeat)];
         let mut calendar_of_link = vec![0; links];
-        let mut named: Vec<usize> =
-            intervals.iter().filter_map(|interval| interval.links.as_ref()).flatten().copied().collect();
-        named.retain(|&link| link < links);
-        named.sort_unstable();
-        named.dedup();
-        for link in named {
-            let covers = |interval: &&UpInterval| interval.links.as_ref().is_none_or(|links| links.contains(&link));
+        // The intervals of each named link, in one pass: a recorded run has many of them.
+        let mut own: Vec<Vec<&UpInterval>> = vec![Vec::new(); links];
+        for interval in intervals {
+            for &link in interval.links.iter().flatten().filter(|link| **link < links) {
+                own[link].push(interval);
+            }
+        }
+        for (link, own) in own.into_iter().enumerate().filter(|(_, own)| !own.is_empty()) {
+            let common = intervals.iter().filter(|interval| interval.links.is_none());
             calendar_of_link[link] = calendars.len();
-            calendars.push(calendar(intervals.iter().filter(covers), repeat));
+            calendars.push(calendar(own.into_iter().chain(common), repeat));
         }
         let mut schedule = Schedule { calendars, calendar_of_link, changes: Vec::new(), repeat };
         schedule.changes = schedule.find_changes();

@@ -108,3 +108,82 @@ pub(super) fn check_told(faults: &mut Collector<'_>, file: &MissionFile, ids: &H
     let allowed = format!("for {name}, a vehicle that every other hears, directly or through others");
     faults.fault(&format!("coordination.law.{name}.{part}"), found, allowed);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::Mission;
+    use super::super::super::file::LawChoice;
+
+    const LEADER: &str = include_str!("../../../../missions/thesis/eq-1-5-leader-integral.toml");
+    const WEIGHTED: &str = include_str!("../../../../missions/thesis/eq-3-62-weighted.toml");
+    const PATTERN: &str = include_str!("../../../../missions/thesis/eq-3-70-pattern.toml");
+    const TOLD: &str = include_str!("../../../../missions/thesis/truly-decentralised.toml");
+    const AUXILIARY: &str = include_str!("../../../../missions/thesis/eq-4-59.toml");
+
+    fn faults_with(text: &str, old: &str, new: &str) -> Vec<String> {
+        assert!(text.contains(old), "{old:?} is not in the mission");
+        let faults = Mission::parse("m.toml", &text.replacen(old, new, 1)).err();
+        faults.map_or(Vec::new(), |faults| faults.to_string().lines().map(str::to_string).collect())
+    }
+
+    #[test]
+    fn the_missions_of_the_newer_laws_can_be_flown() {
+        for (text, says) in [
+            (LEADER, false),
+            (WEIGHTED, false),
+            (PATTERN, true),
+            (include_str!("../../../../missions/thesis/fig-3-10.toml"), false),
+            (include_str!("../../../../missions/thesis/eq-3-83.toml"), false),
+            (include_str!("../../../../missions/thesis/eq-3-86.toml"), false),
+            (TOLD, true),
+            (AUXILIARY, false),
+            (include_str!("../../../../missions/thesis/eq-4-62-example-4-1.toml"), false),
+        ] {
+            let mission = Mission::parse("m.toml", text).unwrap_or_else(|faults| panic!("{faults}"));
+            assert_eq!(mission.law.says().is_some(), says, "{}", mission.name);
+        }
+        assert!(Mission::parse("m", WEIGHTED).is_ok_and(|m| matches!(m.law_choice, LawChoice::Weighted(_))));
+    }
+
+    #[test]
+    fn each_misfit_is_named_with_both_sides() {
+        for (text, old, new, key, part) in [
+            (LEADER, "leader = \"v1\"", "leader = \"v7\"", "coordination.law.leader_integral.leader", "v1, v2"),
+            (LEADER, "b = 0.04", "b = -0.04", "coordination.law.leader_integral", "gain b"),
+            (
+                LEADER,
+                "links = [[\"v1\", \"v2\"]]",
+                "one_way = [[\"v2\", \"v1\"]]",
+                "leader_integral.leader",
+                "does not reach",
+            ),
+            (LEADER, "between = \"advance\"", "between = \"align\"", "coordination.between", "told the delay"),
+            (WEIGHTED, "weight = 0.5", "weight = 0.0", "weights[1].weight", "above 0"),
+            (WEIGHTED, "link = [\"r1\", \"r3\"]", "link = [\"r2\", \"r3\"]", "weights[1].link", "no link"),
+            (WEIGHTED, "link = [\"r1\", \"r3\"]", "link = [\"r2\", \"r1\"]", "weights[1].link", "second weight"),
+            (WEIGHTED, "link = [\"r1\", \"r3\"]", "link = [\"r1\", \"r9\"]", "weights[1].link", "r9"),
+            (PATTERN, "moving_pattern", "solution3", "vehicles[0].pattern_motion", "under solution3"),
+            (PATTERN, "period_s = 31.41592653589793", "period_s = 0.0", "vehicles[0].pattern_motion.period_s", "0.001"),
+            (TOLD, "told = \"r1\"", "told = \"nobody\"", "truly_decentralised.told", "r1, r2, r3"),
+            (TOLD, "[\"r1\", \"r3\"]]", "[\"r2\", \"r3\"]]", "truly_decentralised.told", "does not reach"),
+            (AUXILIARY, "kind = \"II\"", "kind = \"I\"", "fleet.following", "kind I"),
+            (AUXILIARY, "a1 = 10.0", "a1 = 0.0", "coordination.law.auxiliary", "gain a_1"),
+            (
+                LEADER,
+                "{ leader_integral = { leader = \"v1\", a = 0.2, b = 0.04 } }",
+                "{ auxiliary = { a1 = 1.0, a2 = 1.6 } }",
+                "coordination.law",
+                "auxiliary, which needs the alpha_2 of theorem47",
+            ),
+        ] {
+            let found = faults_with(text, old, new);
+            assert!(found.iter().any(|line| line.contains(key) && line.contains(part)), "{new:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn any_vehicle_that_takes_a_rate_can_have_an_auxiliary_state() {
+        let law = "{ leader_integral = { leader = \"v1\", a = 0.2, b = 0.04 } }";
+        assert_eq!(faults_with(LEADER, law, "{ auxiliary_switching = { a1 = 1.0, a2 = 1.6 } }"), Vec::<String>::new());
+    }
+}

@@ -8,16 +8,14 @@ mod vehicle;
 
 use std::collections::HashMap;
 
-use toml::de::DeTable;
-
 use self::coordination::{check_law, check_told, check_weights};
-use self::network::{check_links, check_switching};
+use self::network::{check_links, check_medium, check_switching, with_preset};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
 use super::build;
 use super::fault::{Collector, Faults};
 use super::file::{MissionFile, VehicleSection};
-use super::shape::check_shape;
+use super::read::shaped;
 use super::{Mission, SpeedProfile, VehiclePlan, digest};
 use crate::time::Span;
 
@@ -32,25 +30,7 @@ pub(super) const FASTEST: f64 = 1e6;
 
 pub(super) fn check(name: &str, text: &str) -> Result<Mission, Faults> {
     let mut faults = Collector::new(text);
-    match DeTable::parse(text) {
-        Err(error) => {
-            let byte = error.span().map(|span| span.start);
-            faults.fault_at(byte, String::new(), error.message().to_string());
-            return Err(faults.into_faults(name));
-        }
-        Ok(table) => check_shape(&mut faults, table.get_ref()),
-    }
-    let file: MissionFile = match toml::from_str(text) {
-        Ok(file) => file,
-        Err(error) => {
-            // The shape check explains it better, unless it let something pass.
-            if faults.is_empty() {
-                let byte = error.span().map(|span| span.start);
-                faults.fault_at(byte, String::new(), error.message().to_string());
-            }
-            return Err(faults.into_faults(name));
-        }
-    };
+    let Some(file) = shaped::<MissionFile>(&mut faults, text) else { return Err(faults.into_faults(name)) };
     match assemble(&mut faults, &file, text) {
         Some(mission) if faults.is_empty() => Ok(mission),
         _ => Err(faults.into_faults(name)),
@@ -64,10 +44,12 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let speed = check_formation(faults, file);
     let ids = check_ids(faults, &file.vehicles);
     let law = check_law(faults, file, &ids);
-    let links = check_links(faults, file, &ids);
+    let network = with_preset(&file.network);
+    let links = check_links(faults, file, &network, &ids);
     check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
-    let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    let switching = check_switching(faults, file, &network, &ids, links.as_deref().unwrap_or(&[]));
+    let medium = check_medium(faults, file, &network, &ids);
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);
     let factor = build::nominal_factor(&file.coordination.law);
     let vehicles: Vec<Option<VehiclePlan>> =
@@ -93,6 +75,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         links,
         switching,
         queue: file.network.queue as usize,
+        medium,
     };
     Some(mission)
 }

@@ -3,6 +3,8 @@
 //! A signal is a function of time; asking it in order lets the random one forget what is past. All arithmetic is on
 //! integer nanoseconds, so that two programs with the same mission agree on every instant.
 
+mod in_mean;
+mod markov;
 mod periodic;
 mod random;
 mod round_robin;
@@ -10,6 +12,8 @@ mod schedule;
 
 use crate::random::Stream;
 use crate::time::{Span, Time};
+use in_mean::InMean;
+use markov::Markov;
 use periodic::Periodic;
 use random::RandomLosses;
 use round_robin::RoundRobin;
@@ -33,6 +37,16 @@ enum Signal {
     Schedule(Schedule),
     Random(Box<RandomLosses>),
     RoundRobin(RoundRobin),
+    Markov(Markov),
+    InMean(Box<InMean>),
+    All(Vec<Part>),
+}
+
+/// A signal that counts for these links only; for all of them if there is no list.
+#[derive(Clone, Debug)]
+struct Part {
+    signal: Switching,
+    counts: Option<Vec<bool>>,
 }
 
 impl Switching {
@@ -72,6 +86,48 @@ impl Switching {
         Switching { links, signal: RoundRobin::new(groups, dwell).map_or(Signal::Always, Signal::RoundRobin) }
     }
 
+    /// Groups of links, each with a stream of its own, are up and down for exponential times with these means.
+    pub fn markov(links: usize, groups: Vec<(Vec<usize>, Stream)>, mean_up: Span, mean_down: Span) -> Switching {
+        Switching { links, signal: Signal::Markov(Markov::new(links, groups, mean_up, mean_down)) }
+    }
+
+    /// One group of links at a time, at random, such that the union graph over every window of length `window` is
+    /// connected (Definition 4.4); link l is the arc `arcs[l]` (receiver, sender) among `n` vehicles. No change follows
+    /// another sooner than `dwell`.
+    ///
+    /// # Errors
+    /// The shortest window that is possible with this dwell; `None` if the links can never connect the fleet.
+    ///
+    /// # Panics
+    /// As [`super::Graph::from_arcs`].
+    pub fn in_mean(
+        n: usize,
+        arcs: &[(usize, usize)],
+        groups: Vec<Vec<usize>>,
+        window: Span,
+        dwell: Span,
+        stream: Stream,
+    ) -> Result<Switching, Option<Span>> {
+        let in_mean = InMean::new(n, arcs, groups, window, dwell, stream)?;
+        Ok(Switching { links: arcs.len(), signal: Signal::InMean(Box::new(in_mean)) })
+    }
+
+    /// This signal and another one: a link is up while both have it up. The other one counts for the links of the list
+    /// only, if there is one.
+    pub fn and(self, other: Switching, only: Option<&[usize]>) -> Switching {
+        let links = self.links;
+        let counts = only.map(|only| (0..links).map(|link| only.contains(&link)).collect());
+        let part = Part { signal: other, counts };
+        let parts = match self.signal {
+            Signal::All(mut parts) => {
+                parts.push(part);
+                parts
+            }
+            _ => vec![Part { signal: self, counts: None }, part],
+        };
+        Switching { links, signal: Signal::All(parts) }
+    }
+
     /// Whether this link is up at `t`. Ask in nondecreasing time; a clone made at the start replays from zero.
     pub fn is_up(&mut self, link: usize, t: Time) -> bool {
         link < self.links
@@ -81,10 +137,16 @@ impl Switching {
                 Signal::Schedule(schedule) => schedule.is_up(link, t),
                 Signal::Random(losses) => losses.is_up(t),
                 Signal::RoundRobin(turns) => turns.is_up(link, t),
+                Signal::Markov(walks) => walks.is_up(link, t),
+                Signal::InMean(turns) => turns.is_up(link, t),
+                Signal::All(parts) => parts
+                    .iter_mut()
+                    .all(|part| part.counts.as_ref().is_some_and(|counts| !counts[link]) || part.signal.is_up(link, t)),
             }
     }
 
-    /// The first instant strictly later than `t` at which some link changes; `None` if none ever does again.
+    /// The first instant strictly later than `t` at which some link changes; `None` if none ever does again. Of signals
+    /// that are joined, the first change of any.
     /// Ask in nondecreasing time.
     pub fn next_change_after(&mut self, t: Time) -> Option<Time> {
         if self.links == 0 {
@@ -96,6 +158,9 @@ impl Switching {
             Signal::Schedule(schedule) => schedule.next_change_after(t),
             Signal::Random(losses) => losses.next_change_after(t),
             Signal::RoundRobin(turns) => turns.next_change_after(t),
+            Signal::Markov(walks) => walks.next_change_after(t),
+            Signal::InMean(turns) => turns.next_change_after(t),
+            Signal::All(parts) => parts.iter_mut().filter_map(|part| part.signal.next_change_after(t)).min(),
         }
     }
 }
@@ -190,6 +255,18 @@ mod tests {
     }
 
     #[test]
+    fn joined_signals_are_up_while_all_are() {
+        let interval = |from, to| UpInterval { from: at(from), to: at(to), links: None };
+        let signal = Switching::periodic(2, s(10.0), s(0.0), s(5.0))
+            .and(Switching::intervals(2, vec![interval(2.0, 13.0)], None), Some(&[1]))
+            .and(Switching::intervals(2, vec![interval(0.0, 100.0)], None), None);
+        let at_instants = |link| [0.0, 2.0, 4.9, 5.0, 12.0, 13.0].map(|t| signal.clone().is_up(link, at(t)));
+        assert_eq!(at_instants(0), [true, true, true, false, true, true]);
+        assert_eq!(at_instants(1), [false, true, true, false, true, false]);
+        assert_eq!(changes(&signal, 16.0), [0.0, 2.0, 5.0, 10.0, 13.0, 15.0]);
+    }
+
+    #[test]
     fn silly_arguments_neither_panic_nor_hang() {
         let stream = || Stream::new(1, "silly");
         let zero = Span::ZERO;
@@ -242,6 +319,15 @@ mod tests {
             ),
             Switching::one_at_a_time(3, vec![vec![0], vec![0, 1], vec![2], vec![2]], s(0.25)),
             Switching::random(3, 0.4, s(0.5), s(0.05), Stream::new(3, "p")),
+            Switching::in_mean(
+                3,
+                &[(0, 1), (1, 2), (2, 0)],
+                vec![vec![0], vec![1], vec![2]],
+                s(2.0),
+                s(0.1),
+                Stream::new(3, "p"),
+            )
+            .expect("possible"),
         ];
         for signal in signals {
             // On a grid of 10 ms: what the answers say, beside what was announced.

@@ -1,0 +1,101 @@
+//! Medium access.
+
+use std::collections::HashMap;
+
+use super::super::super::fault::Collector;
+use super::super::super::file::{MissionFile, NetworkSection, SlotsSection, WhenFullChoice};
+use crate::network::Medium;
+use crate::network::medium::{Slots, WhenFull};
+use crate::time::Span;
+use crate::wire::state::STATE_LIMIT;
+
+/// The medium of a mission, if it has one.
+pub(in super::super) fn check_medium(
+    faults: &mut Collector<'_>,
+    file: &MissionFile,
+    network: &NetworkSection,
+    ids: &HashMap<String, usize>,
+) -> Option<Medium> {
+    let section = network.medium.as_ref()?;
+    let key = "network.medium";
+    let within = |value: f64| (0.0..=3600.0).contains(&value);
+    let rate_ok = (1.0..=1e12).contains(&section.rate_bps);
+    faults.number(&format!("{key}.rate_bps"), section.rate_bps, rate_ok, "1 to 1e12 bit/s");
+    if let Some(bytes) = section.packet_bytes.filter(|bytes| !(1..=65_535).contains(bytes)) {
+        faults.fault(&format!("{key}.packet_bytes"), bytes, "1 to 65535 bytes");
+    }
+    faults.number(&format!("{key}.preamble_s"), section.preamble_s, within(section.preamble_s), "0 to 3600 s");
+    faults.number(&format!("{key}.backoff_s"), section.backoff_s, within(section.backoff_s), "0 to 3600 s");
+    if !(1..=10_000).contains(&section.queue) {
+        faults.fault(&format!("{key}.queue"), section.queue, "1 to 10000 messages");
+    }
+    // Silence after a message is at most a hundred thousand times as long as the message.
+    let duty_ok = (1e-5..=1.0).contains(&section.duty_cycle);
+    faults.number(&format!("{key}.duty_cycle"), section.duty_cycle, duty_ok, "0.00001 to 1, a share of the time");
+    let mut medium = Medium {
+        rate: section.rate_bps,
+        preamble: Span::from_secs(section.preamble_s),
+        packet: section.packet_bytes.map(|bytes| bytes as usize),
+        queue: section.queue as usize,
+        when_full: match section.when_full {
+            WhenFullChoice::DropNew => WhenFull::DropNew,
+            WhenFullChoice::DropOld => WhenFull::DropOld,
+        },
+        backoff: Span::from_secs(section.backoff_s),
+        half_duplex: section.half_duplex,
+        collisions: section.collisions,
+        slots: None,
+        duty_cycle: section.duty_cycle,
+    };
+    // What fits a slot at its greatest always fits.
+    let airtime = medium.airtime(STATE_LIMIT);
+    medium.slots = section.slots.as_ref().map(|slots| check_slots(faults, file, ids, slots, airtime));
+    Some(medium)
+}
+
+fn check_slots(
+    faults: &mut Collector<'_>,
+    file: &MissionFile,
+    ids: &HashMap<String, usize>,
+    section: &SlotsSection,
+    airtime: Span,
+) -> Slots {
+    let key = "network.medium.slots";
+    let n = file.vehicles.len();
+    let slot_ok = section.slot_s > 0.0 && section.slot_s <= 86_400.0;
+    faults.number(&format!("{key}.slot_s"), section.slot_s, slot_ok, "above 0 and at most 86400 s");
+    let guard_ok = section.guard_s >= 0.0 && section.guard_s < section.slot_s;
+    faults.number(&format!("{key}.guard_s"), section.guard_s, guard_ok, "0 to below slot_s");
+    let order: Vec<usize> = match &section.order {
+        None => (0..n).collect(),
+        Some(order) => {
+            for id in order.iter().filter(|id| !ids.contains_key(*id)) {
+                let mut known: Vec<&str> = ids.keys().map(String::as_str).collect();
+                known.sort_unstable();
+                faults.fault(&format!("{key}.order"), format!("{id:?}, which is no vehicle"), known.join(", "));
+            }
+            for vehicle in file.vehicles.iter().filter(|vehicle| !order.contains(&vehicle.id)) {
+                faults.fault(
+                    &format!("{key}.order"),
+                    format!("no slot for {}", vehicle.id),
+                    "every vehicle at least once",
+                );
+            }
+            if order.len() > 1000 {
+                faults.fault(
+                    &format!("{key}.order"),
+                    format!("{} slots", order.len()),
+                    "at most 1000 slots in a frame",
+                );
+            }
+            order.iter().filter_map(|id| ids.get(id).copied()).collect()
+        }
+    };
+    let slots = Slots::new(Span::from_secs(section.slot_s), Span::from_secs(section.guard_s), &order, n);
+    if slot_ok && guard_ok && slots.usable() < airtime {
+        let found = format!("{} s, less {} s of guard", section.slot_s, section.guard_s);
+        let allowed = format!("at least the airtime of the longest message, {} s, and the guard", airtime.secs());
+        faults.fault(&format!("{key}.slot_s"), found, allowed);
+    }
+    slots
+}

@@ -1,0 +1,191 @@
+//! What is refused, and what presets become.
+
+use super::super::super::Mission;
+use super::super::super::file::Preset;
+use crate::time::{Span, Time};
+
+const HELIX: &str = include_str!("../../../../../missions/auv-helix.toml");
+
+/// The flagship with another network.
+fn with_network(network: &str) -> String {
+    let (begin, end) = (HELIX.find("delay = { constant").expect("there"), HELIX.find("[fleet]").expect("there"));
+    format!("{}{network}\n{}", &HELIX[..begin], &HELIX[end..])
+}
+
+fn faults(network: &str) -> Vec<String> {
+    let parsed = Mission::parse("m.toml", &with_network(network));
+    parsed.err().map_or(Vec::new(), |faults| faults.to_string().lines().map(str::to_string).collect())
+}
+
+fn mission(network: &str) -> Mission {
+    Mission::parse("m.toml", &with_network(network)).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+#[test]
+fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
+    for (network, key, found, allowed) in [
+        ("loss = { bernoulli = { probability = 1.1 } }", "loss.bernoulli.probability", "1.1", "0 to 1"),
+        ("duplicate_probability = -0.1", "duplicate_probability", "-0.1", "0 to 1"),
+        ("corrupt_probability = 2.0", "corrupt_probability", "2", "0 to 1"),
+        ("delay = { constant = { delay_s = -1.0 } }", "delay.constant.delay_s", "-1", "0 to 3600 s"),
+        ("delay = { normal = { mean_s = 1.0, deviation_s = 0.0 } }", "delay.normal.deviation_s", "0", "above 0"),
+        ("delay = { normal = { mean_s = 1.0, deviation_s = 1.0, min_s = -1.0 } }", "delay.normal.min_s", "-1", "0 to"),
+        (
+            "delay = { gamma = { mean_s = 1.0, deviation_s = 1.0, min_s = 2.0 } }",
+            "delay.gamma.mean_s",
+            "1",
+            "above min_s",
+        ),
+        ("delay = { gamma = { mean_s = 1.0, deviation_s = 100.0 } }", "delay.gamma.deviation_s", "100", "10 times"),
+        ("delay = { distance = { speed_mps = 0.0 } }", "delay.distance.speed_mps", "0", "1 to 3e8 m/s"),
+        (
+            "loss = { gilbert_elliott = { mean_burst = 0.5, mean_gap = 5.0 } }",
+            "loss.gilbert_elliott.mean_burst",
+            "0.5",
+            "1 to",
+        ),
+        (
+            "loss = { gilbert_elliott = { mean_burst = 2.0, mean_gap = 1.5 } }",
+            "loss.gilbert_elliott.mean_gap",
+            "1.5",
+            "2 to",
+        ),
+        (
+            "loss = { gilbert_elliott = { mean_burst = 1.0, mean_gap = 5.0 } }",
+            "loss.gilbert_elliott.mean_gap",
+            "5",
+            "bernoulli",
+        ),
+        (
+            "loss = { shared_fades = { probability = 1.0, mean_burst = 2.0 } }",
+            "loss.shared_fades.probability",
+            "1",
+            "below 1",
+        ),
+        (
+            "loss = { shared_fades = { probability = 0.9, mean_burst = 2.0 } }",
+            "loss.shared_fades.mean_burst",
+            "2",
+            "10",
+        ),
+        ("loss = { trace = { runs = [] } }", "loss.trace.runs", "0", "1 to 1000000"),
+        ("range = { disc = { radius_m = 0.0 } }", "range.disc.radius_m", "0", "above 0"),
+        ("range = { curve = { points = [[5.0, 1.0], [5.0, 0.5]] } }", "range.curve.points[1]", "5", "greater"),
+        ("range = { curve = { points = [[5.0, 1.5]] } }", "range.curve.points[0]", "1.5", "0 to 1"),
+        (
+            "switching = { random = { alpha = 1.0, t_0_s = 1.0, dwell_s = 0.1 } }",
+            "switching.random.alpha",
+            "1",
+            "below 1",
+        ),
+        (
+            "switching = { markov = { mean_up_s = 0.0, mean_down_s = 1.0 } }",
+            "switching.markov.mean_up_s",
+            "0",
+            "30 days",
+        ),
+        (
+            "switching = { connected_in_mean = { window_s = 7.9, dwell_s = 1.0 } }",
+            "switching.connected_in_mean.window_s",
+            "7.9 s",
+            "at least 8 s",
+        ),
+        (
+            "switching = { trace = { links = [] } }",
+            "switching.trace.links",
+            "nothing about link/auv1->auv2",
+            "every directed link",
+        ),
+        ("medium = { rate_bps = 0.0 }", "medium.rate_bps", "0", "1 to 1e12"),
+        ("medium = { rate_bps = 80.0, queue = 0 }", "medium.queue", "0", "1 to 10000"),
+        ("medium = { rate_bps = 80.0, duty_cycle = 1.5 }", "medium.duty_cycle", "1.5", "a share of the time"),
+        (
+            "medium = { rate_bps = 80.0, slots = { slot_s = 4.0, guard_s = 1.0 } }",
+            "medium.slots.slot_s",
+            "4 s, less 1 s of guard",
+            "the airtime",
+        ),
+        (
+            "medium = { rate_bps = 80.0, slots = { slot_s = 9.0, guard_s = 9.0 } }",
+            "medium.slots.guard_s",
+            "9",
+            "below slot_s",
+        ),
+        (
+            "medium = { rate_bps = 1e6, slots = { slot_s = 4.0, guard_s = 1.0, order = [\"auv1\", \"auv3\"] } }",
+            "medium.slots.order",
+            "no slot for auv2",
+            "at least once",
+        ),
+        ("also = [{ links = [[\"auv1\", \"auv2\"]] }]", "also[0]", "no model", "delay, loss or switching"),
+        (
+            "also = [{ links = [[\"auv1\", \"auv3\"]], loss = { bernoulli = { probability = 0.1 } } }]",
+            "also[0].links",
+            "not a link",
+            "network.links",
+        ),
+        ("preset = \"telepathy\"", "preset", "telepathy", "perfect"),
+    ] {
+        let said = faults(network);
+        let fits = |line: &String| {
+            line.contains(&format!(": network.{key}: found ")) && line.contains(found) && line.contains(allowed)
+        };
+        assert!(said.iter().any(fits), "{network}: {said:?}");
+    }
+}
+
+#[test]
+fn every_preset_is_a_network_that_can_be_flown() {
+    for preset in ["perfect", "acoustic_long_range", "acoustic_short_range", "radio_over_the_horizon", "wifi_harbour"] {
+        let mission = mission(&format!("preset = \"{preset}\""));
+        assert_eq!(mission.medium.is_some(), preset.starts_with("acoustic"), "{preset}");
+        assert_eq!(mission.every_message_takes(Span::ZERO), preset == "perfect", "{preset}");
+    }
+    for preset in [Preset::Perfect, Preset::WifiHarbour] {
+        assert!(super::preset(preset).links.is_empty());
+    }
+}
+
+#[test]
+fn a_mission_overrides_its_preset() {
+    let mission = mission("preset = \"acoustic_long_range\"\ndelay = { constant = { delay_s = 2.0 } }");
+    assert_eq!(mission.links[0].fixed_delay(), Some(Span::from_secs(2.0)));
+    let medium = mission.medium.expect("the preset's");
+    assert_eq!(medium.airtime(39), Span::from_secs(2.0), "17 bytes at 80 bit/s after 0.3 s");
+    assert!(mission.links[0].range.is_limited() && mission.links[0].in_order);
+}
+
+#[test]
+fn the_least_delay_is_of_all_layers_and_none_on_a_shared_medium() {
+    let layers = "delay = { normal = { mean_s = 2.0, deviation_s = 1.0, min_s = 0.5 } }\n\
+                  also = [{ delay = { constant = { delay_s = 0.25 } } }]";
+    assert_eq!(mission(layers).least_delay(), Span::from_secs(0.75));
+    assert_eq!(mission(&format!("{layers}\nmedium = {{ rate_bps = 80.0 }}")).least_delay(), Span::ZERO);
+}
+
+#[test]
+fn a_trace_says_when_links_are_up() {
+    let link = |from: &str, to: &str, up: &str| format!("{{ from = \"{from}\", to = \"{to}\", up_s = {up} }}");
+    let links = [
+        link("auv1", "auv2", "[[0.0, 2.0], [3.0, 4.5]]"),
+        link("auv2", "auv1", "[]"),
+        link("auv2", "auv3", "[[1.0, 800.0]]"),
+        link("auv3", "auv2", "[]"),
+    ];
+    let mut signal = mission(&format!("switching = {{ trace = {{ links = [{}] }} }}", links.join(", "))).switching;
+    let up = [0.0, 1.0, 2.0, 3.0, 4.5].map(|t| (0..4).map(|l| signal.is_up(l, Time::from_secs(t))).collect::<Vec<_>>());
+    assert_eq!(up[0], [true, false, false, false]);
+    assert_eq!(up[1], [true, false, true, false]);
+    assert_eq!(up[2], [false, false, true, false]);
+    assert_eq!(up[3], [true, false, true, false]);
+    assert_eq!(up[4], [false, false, true, false]);
+}
+
+#[test]
+fn signals_on_top_count_for_their_links_only() {
+    let off = "intervals = { up = [{ from_s = 10.0, to_s = 20.0 }] }";
+    let network = format!("also = [{{ links = [[\"auv1\", \"auv2\"]], switching = {{ {off} }} }}]");
+    let mut signal = mission(&network).switching;
+    let up: Vec<bool> = (0..4).map(|link| signal.is_up(link, Time::ZERO)).collect();
+    assert_eq!(up, [false, true, true, true]);
+}

@@ -1,0 +1,152 @@
+//! How late a message arrives.
+
+use super::Quantiles;
+use crate::time::Span;
+
+/// No message is under way for longer.
+pub const LONGEST_DELAY: Span = Span::from_nanos(3_600_000_000_000);
+
+/// Delay of a message from the end of its transmission to its arrival.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Delay {
+    /// The same for every message.
+    Constant(Span),
+    /// Uniform between two bounds.
+    Uniform(Span, Span),
+    /// Any distribution; values in seconds.
+    Drawn(Quantiles),
+    /// Distance over the speed of the signal, plus a constant for what modems take.
+    Distance {
+        /// Speed of the signal \[m/s\].
+        speed: f64,
+        /// Added to every delay.
+        extra: Span,
+    },
+}
+
+impl Default for Delay {
+    /// None.
+    fn default() -> Delay {
+        Delay::Constant(Span::ZERO)
+    }
+}
+
+impl Delay {
+    /// Normal with this mean and standard deviation \[s\], cut off below `least` ≥ 0.
+    pub fn normal(mean: f64, deviation: f64, least: f64) -> Delay {
+        Delay::Drawn(Quantiles::normal(mean, deviation, least))
+    }
+
+    /// `least` ≥ 0 plus a gamma variable, with this mean > least and standard deviation in all \[s\].
+    pub fn gamma(mean: f64, deviation: f64, least: f64) -> Delay {
+        let beyond = mean - least;
+        Delay::Drawn(Quantiles::gamma((beyond / deviation).powi(2), deviation * deviation / beyond, least))
+    }
+
+    /// The delay of a message with its own uniform number `u`, over this distance \[m\].
+    pub fn of(&self, u: f64, distance: f64) -> Span {
+        let delay = match self {
+            Delay::Constant(delay) => *delay,
+            Delay::Uniform(least, most) => {
+                let spread = (most.nanos() - least.nanos()) as f64;
+                Span::from_nanos(least.nanos() + (u * spread) as i64)
+            }
+            Delay::Drawn(quantiles) => Span::from_secs(quantiles.at(u)),
+            // A distance that is not a number gives no delay, an endless one the longest.
+            Delay::Distance { speed, extra } => Span::from_secs(distance.max(0.0) / speed) + *extra,
+        };
+        delay.clamp(Span::ZERO, LONGEST_DELAY)
+    }
+
+    /// The least it can be: no message ever arrives earlier.
+    pub fn least(&self) -> Span {
+        match self {
+            Delay::Constant(delay) | Delay::Uniform(delay, _) | Delay::Distance { extra: delay, .. } => *delay,
+            Delay::Drawn(quantiles) => Span::from_secs(quantiles.least()),
+        }
+        .clamp(Span::ZERO, LONGEST_DELAY)
+    }
+
+    /// The delay that every message has, if they all have the same.
+    pub fn fixed(&self) -> Option<Span> {
+        match self {
+            Delay::Constant(delay) => Some(*delay),
+            Delay::Uniform(least, most) => (least == most).then_some(*least),
+            Delay::Drawn(_) | Delay::Distance { .. } => None,
+        }
+    }
+
+    /// Whether it depends on where the vehicles are.
+    pub fn needs_distance(&self) -> bool {
+        matches!(self, Delay::Distance { .. })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::random::Stream;
+
+    fn sample(delay: &Delay, n: u64) -> Vec<f64> {
+        let mut stream = Stream::new(11, "delay");
+        (0..n).map(|number| delay.of(stream.unit_at(number, 1), 0.0).secs()).collect()
+    }
+
+    /// Mean and standard deviation.
+    fn moments(values: &[f64]) -> (f64, f64) {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        (mean, (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt())
+    }
+
+    #[test]
+    fn each_distribution_has_the_mean_and_the_deviation_it_was_given() {
+        let n = 40_000;
+        for (delay, mean, deviation) in [
+            (Delay::Constant(Span::from_secs(2.0)), 2.0, 0.0),
+            (Delay::Uniform(Span::from_secs(1.0), Span::from_secs(3.0)), 2.0, 1.0 / 3f64.sqrt()),
+            (Delay::normal(2.0, 0.3, 0.0), 2.0, 0.3),
+            (Delay::gamma(2.0, 0.8, 0.5), 2.0, 0.8),
+        ] {
+            let (found_mean, found_deviation) = moments(&sample(&delay, n));
+            // Five standard deviations of the mean of n draws; the deviation's own is below 1.5/√n of it for these.
+            let root = (n as f64).sqrt();
+            assert!((found_mean - mean).abs() <= 5.0 * deviation / root + 1e-9, "{delay:?}: mean {found_mean}");
+            assert!(
+                (found_deviation - deviation).abs() <= 7.5 * deviation / root + 1e-9,
+                "deviation {found_deviation}"
+            );
+        }
+    }
+
+    #[test]
+    fn sound_takes_two_seconds_for_three_kilometres() {
+        let delay = Delay::Distance { speed: 1500.0, extra: Span::from_secs(0.1) };
+        assert_eq!(delay.of(0.3, 3000.0), Span::from_secs(2.1));
+        assert_eq!((delay.least(), delay.needs_distance()), (Span::from_secs(0.1), true));
+        assert_eq!(delay.of(0.3, f64::INFINITY), LONGEST_DELAY);
+        assert_eq!(delay.of(0.3, f64::NAN), Span::from_secs(0.1));
+    }
+
+    proptest! {
+        /// What the stepped clock relies on.
+        #[test]
+        fn nothing_arrives_before_the_least_delay_or_after_the_longest(
+            u in 0.0..1.0f64, mean in 0.0..100.0f64, deviation in 1e-6..100.0f64, least in 0.0..50.0f64,
+            distance in prop_oneof![0.0..1e9f64, Just(f64::NAN), Just(f64::INFINITY)],
+        ) {
+            for delay in [
+                Delay::normal(mean, deviation, least),
+                Delay::gamma(least + mean + 1e-3, deviation, least),
+                Delay::Uniform(Span::from_secs(least), Span::from_secs(least + mean)),
+                Delay::Distance { speed: 1500.0, extra: Span::from_secs(least) },
+            ] {
+                let span = delay.of(u, distance);
+                prop_assert!(span >= delay.least(), "{:?} < {:?} of {:?}", span, delay.least(), delay);
+                prop_assert!(span <= LONGEST_DELAY);
+            }
+        }
+    }
+}

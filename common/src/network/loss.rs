@@ -1,0 +1,134 @@
+//! Which messages are lost on the way.
+
+use std::sync::Arc;
+
+use super::TwoStates;
+use crate::random::{LANES, Stream};
+
+/// Lane of the numbers of a message that decides a plain loss.
+const LOSS: usize = 0;
+
+/// A model of losses on one link, or on all of them together.
+#[derive(Clone, Debug)]
+pub enum Loss {
+    /// Each message with the same probability, independently.
+    Bernoulli(f64),
+    /// In bursts (Gilbert 1960), with a probability in a burst and one in a gap (Elliott 1963).
+    Bursts {
+        /// When bursts come and go.
+        states: TwoStates,
+        /// Probability that a message in a burst is lost.
+        in_burst: f64,
+        /// Probability that a message in a gap is lost.
+        in_gap: f64,
+    },
+    /// Fades that all links share: a link follows the common fade with probability `correlation`, and one of its own,
+    /// alike in the mean, otherwise. Each message is lost with the share of fades, whatever the correlation; the losses
+    /// of two links have correlation `correlation`².
+    SharedFades {
+        /// The common fade.
+        common: TwoStates,
+        /// The stream of the common fade, the same for all links.
+        common_stream: Stream,
+        /// The link's own.
+        own: TwoStates,
+        /// 0 to 1.
+        correlation: f64,
+    },
+    /// As recorded: message m is lost if `lost[m mod length]`.
+    Trace(Arc<[bool]>),
+}
+
+impl Loss {
+    /// Whether message `number` is lost; `drawn` are its own numbers of `stream`.
+    pub fn loses(&mut self, stream: &mut Stream, number: u64, drawn: &[f64; LANES]) -> bool {
+        match self {
+            Loss::Bernoulli(probability) => drawn[LOSS] < *probability,
+            Loss::Bursts { states, in_burst, in_gap } => {
+                let probability = if states.in_burst(stream, number, drawn) { *in_burst } else { *in_gap };
+                drawn[LOSS] < probability
+            }
+            Loss::SharedFades { common, common_stream, own, correlation } => {
+                if drawn[LOSS] < *correlation {
+                    let drawn = common_stream.units_at(number);
+                    common.in_burst(common_stream, number, &drawn)
+                } else {
+                    own.in_burst(stream, number, drawn)
+                }
+            }
+            Loss::Trace(lost) => !lost.is_empty() && lost[(number % lost.len() as u64) as usize],
+        }
+    }
+
+    /// The long-run share of messages that is lost.
+    pub fn mean(&self) -> f64 {
+        match self {
+            Loss::Bernoulli(probability) => *probability,
+            Loss::Bursts { states, in_burst, in_gap } => states.share() * in_burst + (1.0 - states.share()) * in_gap,
+            Loss::SharedFades { common, .. } => common.share(),
+            Loss::Trace(lost) => lost.iter().filter(|lost| **lost).count() as f64 / lost.len().max(1) as f64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lost(loss: &Loss, name: &str, n: u64) -> Vec<f64> {
+        let (mut loss, mut stream) = (loss.clone(), Stream::new(9, name));
+        (0..n)
+            .map(|number| {
+                let drawn = stream.units_at(number);
+                f64::from(u8::from(loss.loses(&mut stream, number, &drawn)))
+            })
+            .collect()
+    }
+
+    fn mean(values: &[f64]) -> f64 {
+        values.iter().sum::<f64>() / values.len() as f64
+    }
+
+    #[test]
+    fn each_model_loses_its_share() {
+        let n = 100_000;
+        for (loss, share, burst) in [
+            (Loss::Bernoulli(0.3), 0.3, 1.0 / 0.7),
+            (Loss::Bursts { states: TwoStates::new(5.0, 15.0), in_burst: 0.8, in_gap: 0.1 }, 0.275, 5.0),
+            (shared(0.2, 6.0, 0.5), 0.2, 6.0),
+            (Loss::Trace([true, false, false, false].into()), 0.25, 1.0),
+        ] {
+            assert!((loss.mean() - share).abs() < 1e-9, "{loss:?}");
+            // Bursts make n messages worth about n/(2 burst) independent ones.
+            let bound = 5.0 * (share * (1.0 - share) * 2.0 * burst / n as f64).sqrt();
+            let found = mean(&lost(&loss, "a", n));
+            assert!((found - share).abs() < bound, "{found} for {share} ± {bound}");
+        }
+    }
+
+    fn shared(share: f64, burst: f64, correlation: f64) -> Loss {
+        let states = TwoStates::with_share(share, burst);
+        Loss::SharedFades { common: states.clone(), common_stream: Stream::new(9, "fades"), own: states, correlation }
+    }
+
+    #[test]
+    fn losses_of_two_links_are_as_correlated_as_told() {
+        let n = 200_000;
+        for correlation in [0.0, 0.5, 1.0] {
+            let loss = shared(0.3, 3.0, correlation);
+            let (a, b) = (lost(&loss, "a", n), lost(&loss, "b", n));
+            let both = mean(&a.iter().zip(&b).map(|(a, b)| a * b).collect::<Vec<_>>());
+            let found = (both - mean(&a) * mean(&b)) / (0.3 * 0.7);
+            // The standard deviation of a correlation of n pairs is at most about 1/√n, more with bursts.
+            let bound = 5.0 * (2.0 * 3.0 / n as f64).sqrt();
+            assert!((found - correlation * correlation).abs() < bound, "{found} for {}", correlation * correlation);
+        }
+    }
+
+    #[test]
+    fn a_trace_repeats() {
+        let loss = Loss::Trace([false, true, true].into());
+        assert_eq!(lost(&loss, "a", 7), [0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(lost(&Loss::Trace([].into()), "a", 3), [0.0; 3]);
+    }
+}

@@ -1,0 +1,105 @@
+//! Changes a mission file at a key.
+
+use toml::{Table, Value};
+
+/// The text of a mission file with some of its keys set to other values. Whether the keys exist, and whether the mission can
+/// be flown with them, is for the mission's own check to say.
+///
+/// # Errors
+/// Which key cannot be reached, and why.
+pub fn changed(text: &str, changes: &[(&str, &Value)]) -> Result<String, String> {
+    let mut root: Table = text.parse().map_err(|error: toml::de::Error| error.message().to_string())?;
+    for (key, value) in changes {
+        let mut steps: Vec<&str> = key.split('.').collect();
+        let last = steps.pop().unwrap_or(key);
+        let mut here = &mut root;
+        for (depth, step) in steps.iter().enumerate() {
+            here = below(here, step).ok_or_else(|| {
+                format!("{key}: found nothing at {}; allowed: a key of the mission file", steps[..=depth].join("."))
+            })?;
+        }
+        match index(last) {
+            Some((name, at)) => {
+                let item = here.get_mut(name).and_then(Value::as_array_mut).and_then(|array| array.get_mut(at));
+                *item.ok_or_else(|| format!("{key}: found no such item; allowed: an item of the mission file"))? =
+                    (*value).clone();
+            }
+            None => {
+                here.insert(last.to_string(), (*value).clone());
+            }
+        }
+    }
+    Ok(root.to_string())
+}
+
+/// The table below a table at `name` or `name[index]`. One that is not there yet is made: keys with a default need not be in
+/// the file.
+fn below<'t>(table: &'t mut Table, step: &str) -> Option<&'t mut Table> {
+    if let Some((name, at)) = index(step) {
+        return table.get_mut(name)?.as_array_mut()?.get_mut(at)?.as_table_mut();
+    }
+    let value = table.entry(step.to_string()).or_insert_with(|| Value::Table(Table::new()));
+    // A choice without keys, such as "none", gives way to one with some.
+    if value.is_str() {
+        *value = Value::Table(Table::new());
+    }
+    value.as_table_mut()
+}
+
+/// `name[3]` as its parts.
+fn index(step: &str) -> Option<(&str, usize)> {
+    let (name, rest) = step.split_once('[')?;
+    Some((name, rest.strip_suffix(']')?.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use common::mission::Mission;
+
+    use super::*;
+
+    const MISSION: &str = include_str!("../../../missions/thesis/fig-1-9.toml");
+
+    fn with(key: &str, value: impl Into<Value>) -> Result<Mission, String> {
+        let text = changed(MISSION, &[(key, &value.into())])?;
+        Mission::parse("m.toml", &text).map_err(|faults| faults.to_string())
+    }
+
+    #[test]
+    fn a_key_that_is_there_is_changed() {
+        assert_eq!(with("duration_s", 7.0).expect("sound").end.secs(), 7.0);
+        assert_eq!(with("vehicles[1].start.x_m", 3).expect("sound").vehicles[1].start.position[0], 3.0);
+        assert_eq!(with("network.links[0]", vec!["v2", "v1"]).expect("sound").links[0].from, 1);
+    }
+
+    #[test]
+    fn a_key_with_a_default_is_added_and_a_bare_choice_gives_way() {
+        let lossy = with("network.loss.bernoulli.probability", 0.25).expect("sound");
+        assert!(format!("{:?}", lossy.links[0]).contains("0.25"), "{:?}", lossy.links[0]);
+        assert!(with("coordination.validity_s", 1.5).expect("sound").validity.is_some());
+        let bare = changed(MISSION, &[("network.loss", &Value::from("none"))]).expect("changed");
+        assert!(changed(&bare, &[("network.loss.bernoulli.probability", &Value::from(0.5))]).is_ok());
+    }
+
+    #[test]
+    fn what_no_mission_has_is_refused_with_the_reason() {
+        for (key, value, reason) in [
+            ("network.los", Value::from(1.0), "network.los: found an unknown key; allowed: "),
+            ("coordination.law.switching.gain", Value::from(1.0), "coordination.law: found a table; allowed: one of"),
+            ("vehicles[7].id", Value::from("x"), "vehicles[7].id: found nothing at vehicles[7]"),
+            ("duration_s.x", Value::from(1), "duration_s.x: found nothing at duration_s"),
+            ("duration_s", Value::from("long"), "duration_s: found a string; allowed: "),
+            ("network.links[9]", Value::from(1), "network.links[9]: found no such item"),
+        ] {
+            let found = with(key, value).expect_err(key);
+            assert!(found.contains(reason), "{found}");
+        }
+    }
+
+    #[test]
+    fn nothing_else_is_changed() {
+        let same = changed(MISSION, &[]).expect("changed");
+        let (a, b): (Table, Table) = (MISSION.parse().expect("a table"), same.parse().expect("a table"));
+        assert_eq!(a, b);
+    }
+}

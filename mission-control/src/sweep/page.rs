@@ -1,0 +1,79 @@
+//! What a sweep found, as a page in Markdown.
+
+use std::fmt::Write as _;
+
+use super::Swept;
+use super::measure::MEASURES;
+use super::plan::Plan;
+use super::setting::shown;
+
+/// More cells than this are left to `cells.csv`.
+const MOST_CELLS: usize = 200;
+
+/// The page of a sweep.
+pub(super) fn page(plan: &Plan, swept: &Swept, measure: usize, command: &str, pictured: bool) -> String {
+    let mut page = format!("# {}\n\n", plan.mission.name);
+    if !plan.mission.about.is_empty() {
+        let _ = writeln!(page, "{}\n", plan.mission.about);
+    }
+    table(&mut page, plan, swept, measure, pictured.then_some("sweep.svg"));
+    how(&mut page, plan, command);
+    page
+}
+
+/// Picture and numbers of a sweep.
+pub(super) fn table(page: &mut String, plan: &Plan, swept: &Swept, measure: usize, picture: Option<&str>) {
+    let about = MEASURES[measure].about;
+    if let Some(picture) = picture {
+        let _ = writeln!(page, "![{about}]({picture})\n");
+    }
+    if swept.cells.len() > MOST_CELLS {
+        let _ = writeln!(page, "The numbers of the {} cells are in cells.csv.\n", swept.cells.len());
+        return;
+    }
+    let _ = writeln!(page, "{}:\n", capitalised(about));
+    let keys: Vec<&str> = plan.settings.iter().map(|setting| setting.key.as_str()).collect();
+    let lead = keys.iter().map(|key| format!("{key} | ")).collect::<String>();
+    let _ = writeln!(page, "| {lead}median | 5 % | 95 % | mean | runs |");
+    let _ = writeln!(page, "|{}", "---|".repeat(keys.len() + 5));
+    for (cell, statistics) in plan.cells.iter().zip(&swept.cells) {
+        let values: String = cell.values.iter().map(|value| format!("{} | ", shown(value))).collect();
+        let numbers = match statistics.spreads[measure] {
+            Some(s) => [s.median, s.low, s.high, s.mean].map(short).join(" | "),
+            None => "– | – | – | –".into(),
+        };
+        let _ = writeln!(page, "| {values}{numbers} | {} |", statistics.finished);
+    }
+    page.push('\n');
+}
+
+/// How the sweep is made again, and each run of it.
+pub(super) fn how(page: &mut String, plan: &Plan, command: &str) {
+    let runs = plan.cells.len() * plan.repeats as usize;
+    let _ = write!(
+        page,
+        "{runs} runs, {} of each cell; made by\n\n```sh\n{command}\n```\n\nThe seed of a run follows from the mission's seed, the \
+         values of its cell and the number of the repeat; it is in runs.csv. The first run of the last cell is flown again by\n\n\
+         ```sh\n{}\n```\n",
+        plan.repeats,
+        plan.replay(plan.cells.len() - 1, 0)
+    );
+}
+
+fn capitalised(text: &str) -> String {
+    let mut characters = text.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
+}
+
+/// Four digits.
+fn short(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 {
+        "0".into()
+    } else if (1e-3..1e7).contains(&magnitude) {
+        let decimals = (3.0 - magnitude.log10().floor()).clamp(0.0, 6.0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.2e}")
+    }
+}

@@ -1,0 +1,376 @@
+//! The channel: decides for every message and every directed link whether it arrives, and when. A pure machine.
+//!
+//! Decisions about a message are functions of (seed, link, message number), of positions as the vehicles' own words tell
+//! them, and of the planned switching signal, never of the order in which messages happen to come: two runs can be
+//! compared message by message. Where messages disturb one another, on a shared medium, it is settled at instants of
+//! mission time: links change first, then transmissions begin, by sender, then messages arrive.
+//!
+//! | file | decides |
+//! |---|---|
+//! | `wire.rs` | what one directed link does to a message |
+//! | `sender.rs` | when a vehicle may speak, on a shared medium |
+//! | `air.rs` | what overlaps at a receiver, on a shared medium |
+//! | `parcel.rs` | in which order messages arrive that are due at the same instant |
+
+mod air;
+mod parcel;
+mod sender;
+#[cfg(test)]
+mod tests;
+mod wire;
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+use std::sync::Arc;
+
+use common::graph::switching::Switching;
+use common::machine::Machine;
+use common::mission::{Link, Mission};
+use common::network::Whereabouts;
+use common::random::Stream;
+use common::record::{ClockRecord, Fate, Name, NoteRow, Record, Row, Settled, TopologyRow};
+use common::time::{Span, Time};
+use common::wire::state::CoordinationState;
+use common::wire::{Garbage, GarbageCount};
+
+use self::air::Air;
+use self::parcel::{Parcel, UnderWay};
+use self::sender::Sender;
+use self::wire::{Wire, flip};
+use crate::ledger::Ledger;
+
+/// A vehicle put bytes on the air.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sent {
+    /// Index of the vehicle whose line they came from.
+    pub from: usize,
+    /// The bytes.
+    pub bytes: Arc<[u8]>,
+}
+
+/// What the channel wants done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Channel {
+    /// Hand these bytes to that vehicle.
+    Deliver {
+        /// Index of the receiver.
+        to: usize,
+        /// When they were due.
+        due: Time,
+        /// The bytes.
+        bytes: Arc<[u8]>,
+    },
+    /// Record this row.
+    Record(Row),
+    /// Record what became of a message.
+    Settled(Settled),
+}
+
+/// The emulated network of one mission.
+pub struct Emulator {
+    mission: Arc<Mission>,
+    /// The vehicles' names, for the rows.
+    names: Vec<Name>,
+    links: Vec<Wire>,
+    /// Indices into `links`, by sender.
+    out: Vec<Vec<usize>>,
+    switching: Switching,
+    up: Vec<bool>,
+    next_change: Option<Time>,
+    under_way: BinaryHeap<Reverse<UnderWay>>,
+    /// Number of the newest message taken from each vehicle, to tell a repetition.
+    newest: Vec<Option<u32>>,
+    /// How many messages were taken from each vehicle.
+    taken: Vec<u64>,
+    /// Where the vehicles are, if it matters.
+    whereabouts: Option<Whereabouts>,
+    /// On a shared medium: who waits to speak, and what is arriving at whom; empty without.
+    senders: Vec<Sender>,
+    airs: Vec<Air>,
+    receptions: u64,
+    garbage: Vec<GarbageCount>,
+    /// With a real clock the achieved delay is recorded beside the commanded one: mission seconds per second of wall
+    /// clock.
+    watch_delays: Option<f64>,
+    outputs: VecDeque<Channel>,
+}
+
+impl Emulator {
+    /// The network of a mission at its start.
+    pub fn new(mission: Arc<Mission>, watch_delays: Option<f64>) -> Emulator {
+        let n = mission.vehicles.len();
+        let mut out = vec![Vec::new(); n];
+        for (index, link) in mission.links.iter().enumerate() {
+            out[link.from].push(index);
+        }
+        let sender = |(index, vehicle): (usize, &common::mission::VehiclePlan)| {
+            Sender::new(index, Stream::new(mission.seed, &format!("medium/{}", vehicle.id)))
+        };
+        let places = mission.vehicles.iter().map(|v| (v.path.clone(), v.pattern, v.start.xi));
+        let shared = mission.medium.is_some();
+        let mut emulator = Emulator {
+            names: mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect(),
+            links: mission.links.iter().map(|link| Wire::new(link, mission.seed)).collect(),
+            out,
+            switching: mission.switching.clone(),
+            up: vec![false; mission.links.len()],
+            next_change: Some(Time::ZERO),
+            under_way: BinaryHeap::new(),
+            newest: vec![None; n],
+            taken: vec![0; n],
+            whereabouts: mission.links.iter().any(Link::needs_distance).then(|| Whereabouts::new(places)),
+            senders: if shared { mission.vehicles.iter().enumerate().map(sender).collect() } else { Vec::new() },
+            airs: (0..if shared { n } else { 0 }).map(|_| Air::default()).collect(),
+            receptions: 0,
+            garbage: vec![GarbageCount::default(); n],
+            watch_delays,
+            outputs: VecDeque::new(),
+            mission,
+        };
+        emulator.change(Time::ZERO, true);
+        emulator
+    }
+
+    /// Brings a network that begins under way to the present without recording what it missed.
+    pub fn skip_to(&mut self, now: Time) {
+        while let Some(change) = self.next_change.filter(|change| *change <= now) {
+            self.change(change, false);
+        }
+    }
+
+    /// The ledger of each directed link, in the order of the mission's links.
+    pub fn ledgers(&self) -> impl Iterator<Item = &Ledger> {
+        self.links.iter().map(|link| &link.ledger)
+    }
+
+    /// Sent, delivered, dropped, in flight, over all links.
+    pub fn totals(&self) -> [u64; 4] {
+        let add =
+            |[s, d, x, f]: [u64; 4], l: &Ledger| [s + l.sent, d + l.delivered(), x + l.dropped(), f + l.in_flight];
+        self.ledgers().fold([0; 4], add)
+    }
+
+    /// Garbage counted per vehicle.
+    pub fn garbage(&self) -> &[GarbageCount] {
+        &self.garbage
+    }
+
+    /// Closes the books: what is under way, or still waits to be sent, is recorded as such.
+    pub fn finish(&mut self, now: Time) {
+        for Reverse(message) in std::mem::take(&mut self.under_way).into_sorted_vec().into_iter().rev() {
+            let fate = if message.copy { Fate::CopyInFlight } else { Fate::InFlight };
+            self.record_message(now, &message, fate);
+        }
+        for vehicle in 0..self.senders.len() {
+            for parcel in self.senders[vehicle].rest() {
+                for slot in 0..self.out[vehicle].len() {
+                    let message = unsent(now, &parcel, self.out[vehicle][slot]);
+                    self.record_message(now, &message, Fate::InFlight);
+                }
+            }
+        }
+        for (vehicle, garbage) in self.garbage.iter().enumerate() {
+            if garbage.total() > 0 {
+                let text = format!("messages ignored that came from {}", self.mission.vehicles[vehicle].id);
+                let source = "network-emulator".to_string();
+                let row = NoteRow { t_ns: now.nanos(), source, text, count: garbage.total() };
+                self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Note(row))));
+            }
+        }
+    }
+
+    /// Takes a message from a vehicle: one decision per directed link.
+    fn take(&mut self, now: Time, sent: &Sent) -> Result<(), Garbage> {
+        let state = CoordinationState::decode(&sent.bytes)?;
+        if state.mission != self.mission.digest {
+            return Err(Garbage::WrongMission);
+        }
+        if state.sender as usize != sent.from {
+            return Err(Garbage::Forged);
+        }
+        if self.newest[sent.from].is_some_and(|newest| newest >= state.seq) {
+            return Err(Garbage::Stale);
+        }
+        self.newest[sent.from] = Some(state.seq);
+        if let Some(whereabouts) = &mut self.whereabouts {
+            whereabouts.said(sent.from, now, state.made, state.xi);
+        }
+        let bytes = Arc::clone(&sent.bytes);
+        let parcel = Parcel { from: sent.from, seq: state.seq, number: self.taken[sent.from], sent: now, bytes };
+        self.taken[sent.from] += 1;
+        for slot in 0..self.out[sent.from].len() {
+            let link = self.out[sent.from][slot];
+            self.links[link].ledger.take();
+            if self.mission.medium.is_none() {
+                self.transmit(&parcel, link, now, Span::ZERO);
+            }
+        }
+        if let Some(medium) = &self.mission.medium
+            && let Some(dropped) = self.senders[sent.from].take(medium, parcel)
+        {
+            for slot in 0..self.out[sent.from].len() {
+                let message = unsent(now, &dropped, self.out[sent.from][slot]);
+                self.settle(now, &message, Fate::QueueFull);
+            }
+        }
+        Ok(())
+    }
+
+    /// A vehicle's turn has come to speak.
+    fn speak(&mut self, t: Time, vehicle: usize) {
+        let Some(medium) = &self.mission.medium else { return };
+        let Some(parcel) = self.senders[vehicle].speak(medium) else { return };
+        let airtime = medium.airtime(parcel.bytes.len());
+        self.airs[vehicle].speak(medium, t, t + airtime);
+        for slot in 0..self.out[vehicle].len() {
+            self.transmit(&parcel, self.out[vehicle][slot], t, airtime);
+        }
+    }
+
+    /// A message leaves its sender on one link: dropped at once, or under way.
+    fn transmit(&mut self, parcel: &Parcel, link: usize, start: Time, airtime: Span) {
+        let wire = &mut self.links[link];
+        let distance = match &self.whereabouts {
+            Some(whereabouts) if wire.needs_distance => whereabouts.distance(wire.from, wire.to, start),
+            _ => 0.0,
+        };
+        let bits = 8 * parcel.bytes.len();
+        let verdict = wire.decide(parcel.seq, bits, (start, airtime), distance, self.mission.queue);
+        let (due, corrupt) = (verdict.due, verdict.flipped.is_some());
+        let mut message = UnderWay { due, parcel: parcel.clone(), link, copy: false, corrupt, reception: None };
+        if let Some(cause) = verdict.dropped {
+            return self.settle(start, &message, cause);
+        }
+        if let Some(bit) = verdict.flipped {
+            message.parcel.bytes = flip(&parcel.bytes, bit);
+        }
+        if let Some(due) = verdict.copy {
+            wire.ledger.copy();
+            self.under_way.push(Reverse(UnderWay { due, copy: true, ..message.clone() }));
+        }
+        if let Some(medium) = &self.mission.medium {
+            self.airs[wire.to].enter(medium, self.receptions, due - airtime, due);
+            message.reception = Some(self.receptions);
+            self.receptions += 1;
+        }
+        self.under_way.push(Reverse(message));
+    }
+
+    fn settle(&mut self, t: Time, message: &UnderWay, fate: Fate) {
+        self.links[message.link].ledger.settle(fate);
+        self.record_message(t, message, fate);
+    }
+
+    fn record_message(&mut self, t: Time, message: &UnderWay, fate: Fate) {
+        self.record_settled(t, message, fate, None);
+    }
+
+    fn record_settled(&mut self, t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i64>) {
+        self.outputs.push_back(Channel::Settled(Settled {
+            t_ns: t.nanos(),
+            link: message.link,
+            seq: message.parcel.number,
+            sent_ns: message.parcel.sent.nanos(),
+            due_ns: message.due.nanos(),
+            fate,
+            late_ns,
+        }));
+    }
+
+    /// A message has come to the end of its way: it is received if the link is up at that instant (p(t) gates reception,
+    /// erratum 4.22), and nothing spoilt it meanwhile.
+    fn arrive(&mut self, now: Time, message: UnderWay) {
+        let to = self.links[message.link].to;
+        let spoilt = message.reception.and_then(|key| self.airs[to].leave(key));
+        let arrived = if message.corrupt { Fate::Corrupt } else { Fate::Delivered };
+        let fate = if self.up[message.link] { spoilt.unwrap_or(arrived) } else { Fate::LinkDown };
+        let handed_over = fate == arrived;
+        let fate = match (message.copy, handed_over) {
+            (false, _) => fate,
+            (true, true) => Fate::Copied,
+            (true, false) => Fate::CopyDropped,
+        };
+        self.links[message.link].ledger.settle(fate);
+        let late_ns = self
+            .watch_delays
+            .filter(|_| fate == Fate::Delivered)
+            .map(|speed_up| ((now - message.due).nanos() as f64 / speed_up) as i64);
+        self.record_settled(message.due, &message, fate, late_ns);
+        if !handed_over {
+            return;
+        }
+        self.outputs.push_back(Channel::Deliver { to, due: message.due, bytes: message.parcel.bytes });
+    }
+
+    /// The switching signal changes at `t`: record the links that come or go.
+    fn change(&mut self, t: Time, record: bool) {
+        for index in 0..self.links.len() {
+            let up = self.switching.is_up(index, t);
+            let first = t == Time::ZERO;
+            if record && (first || up != self.up[index]) {
+                let row = TopologyRow {
+                    t_ns: t.nanos(),
+                    from: self.names[self.links[index].from].clone(),
+                    to: self.names[self.links[index].to].clone(),
+                    up,
+                };
+                self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));
+            }
+            self.up[index] = up;
+        }
+        self.next_change = self.switching.next_change_after(t).filter(|change| *change <= self.mission.end);
+    }
+
+    /// Who speaks next, and when; the first of those who speak at the same instant.
+    fn next_speaker(&self) -> Option<(Time, usize)> {
+        self.senders.iter().enumerate().filter_map(|(vehicle, sender)| Some((sender.next()?, vehicle))).min()
+    }
+}
+
+/// A message that never left its sender.
+fn unsent(now: Time, parcel: &Parcel, link: usize) -> UnderWay {
+    UnderWay { due: now, parcel: parcel.clone(), link, copy: false, corrupt: false, reception: None }
+}
+
+impl Machine for Emulator {
+    type Input = Sent;
+    type Output = Channel;
+
+    fn handle(&mut self, now: Time, input: Option<Sent>) {
+        match input {
+            Some(sent) => {
+                if let Err(kind) = self.take(now, &sent)
+                    && self.garbage[sent.from].count(kind)
+                {
+                    let id = &self.mission.vehicles[sent.from].id;
+                    let text = format!("first message ignored from {id} that is {}", kind.as_str());
+                    let row = NoteRow { t_ns: now.nanos(), source: "network-emulator".into(), text, count: 1 };
+                    self.outputs.push_back(Channel::Record(Row::Clock(ClockRecord::Note(row))));
+                }
+            }
+            None => {
+                // Changes, transmissions and arrivals in the order of their instants. At the same instant the link changes
+                // first, so that an interval of up time contains its begin and not its end.
+                while let Some(next) = self.poll_timeout().filter(|next| *next <= now) {
+                    if self.next_change.is_some_and(|change| change <= next) {
+                        self.change(next, true);
+                    } else if let Some((start, vehicle)) = self.next_speaker().filter(|(start, _)| *start <= next) {
+                        self.speak(start, vehicle);
+                    } else if let Some(Reverse(message)) = self.under_way.pop() {
+                        self.arrive(now, message);
+                    }
+                }
+            }
+        }
+    }
+
+    fn poll_output(&mut self) -> Option<Channel> {
+        self.outputs.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Time> {
+        let arrival = self.under_way.peek().map(|Reverse(message)| message.due);
+        let speech = self.next_speaker().map(|(start, _)| start);
+        [self.next_change, speech, arrival].into_iter().flatten().min()
+    }
+}

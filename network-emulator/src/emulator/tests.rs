@@ -1,0 +1,579 @@
+//! The channel, mechanism by mechanism, and all of it together.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// A mission of three vehicles on lines whose network is given.
+fn mission(network: &str) -> Arc<Mission> {
+    let vehicle = |i: usize| {
+        format!(
+            "[[vehicles]]\nid = \"v{i}\"\npath = {{ line = {{ start_m = [0.0, {i}.0] }} }}\nstart = {{ x_m = 0.0, y_m = {i}.0 }}\n"
+        )
+    };
+    let text = format!(
+        "name = \"t\"\nseed = 5\nduration_s = 100.0\n[formation]\nspeed = 0.5\n\
+         [coordination]\nlaw = {{ switching = {{ gain = 0.1 }} }}\n\
+         [network]\nlinks = [[\"v1\", \"v2\"], [\"v2\", \"v3\"]]\n{network}\n\
+         [fleet]\nmodel = \"kinematic_unicycle\"\nfollowing = {{ line_of_sight = {{ distance_m = 1.0 }} }}\n{}{}{}",
+        vehicle(1),
+        vehicle(2),
+        vehicle(3)
+    );
+    Arc::new(Mission::parse("t.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
+}
+
+fn state(mission: &Mission, sender: u16, seq: u32) -> Arc<[u8]> {
+    state_at(mission, sender, seq, 1.0)
+}
+
+fn seconds(t: f64) -> Time {
+    Time::from_secs(t)
+}
+
+fn drain(emulator: &mut Emulator) -> Vec<Channel> {
+    std::iter::from_fn(|| emulator.poll_output()).collect()
+}
+
+/// Who got something, and when it was due.
+fn deliveries(outputs: &[Channel]) -> Vec<(usize, Time)> {
+    let delivery = |output: &Channel| match output {
+        Channel::Deliver { to, due, .. } => Some((*to, *due)),
+        Channel::Record(_) | Channel::Settled(_) => None,
+    };
+    outputs.iter().filter_map(delivery).collect()
+}
+
+#[test]
+fn a_message_reaches_the_neighbours_after_the_delay_and_nobody_else() {
+    let mission = mission("delay = { constant = { delay_s = 2.0 } }");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state(&mission, 0, 0) }));
+    emulator.handle(seconds(2.999), None);
+    assert_eq!(deliveries(&drain(&mut emulator)), vec![], "never early");
+    emulator.handle(seconds(3.0), None);
+    assert_eq!(deliveries(&drain(&mut emulator)), vec![(1, seconds(3.0))]);
+}
+
+#[test]
+fn the_switching_signal_gates_reception_and_not_transmission() {
+    // Up in [7.5, 10) of every 10 s, 5 s of delay: what is said at 3 s is heard at 8 s, what is said at 8 s is not.
+    let mission = mission(
+        "delay = { constant = { delay_s = 5.0 } }\nswitching = { periodic = { period_s = 10.0, up_from_s = 7.5, up_for_s = 2.5 } }",
+    );
+    let mut emulator = Emulator::new(mission.clone(), None);
+    emulator.handle(seconds(3.0), Some(Sent { from: 0, bytes: state(&mission, 0, 0) }));
+    emulator.handle(seconds(8.0), Some(Sent { from: 0, bytes: state(&mission, 0, 1) }));
+    emulator.handle(seconds(20.0), None);
+    assert_eq!(deliveries(&drain(&mut emulator)), vec![(1, seconds(8.0))]);
+    let ledger = emulator.ledgers().next().copied().expect("a link");
+    assert_eq!((ledger.sent, ledger.delivered(), ledger.of(Fate::LinkDown)), (2, 1, 1));
+}
+
+#[test]
+fn an_interval_of_up_time_contains_its_begin_and_not_its_end() {
+    let mission = mission("switching = { periodic = { period_s = 10.0, up_from_s = 0.0, up_for_s = 2.0 } }");
+    for (t, heard) in [(0.0, 1), (1.999, 1), (2.0, 0), (9.999, 0), (10.0, 1)] {
+        let mut emulator = Emulator::new(mission.clone(), None);
+        emulator.handle(seconds(t), Some(Sent { from: 0, bytes: state(&mission, 0, 0) }));
+        emulator.handle(seconds(t), None);
+        assert_eq!(deliveries(&drain(&mut emulator)).len(), heard, "at {t} s");
+    }
+}
+
+#[test]
+fn bernoulli_losses_come_at_their_probability() {
+    let mission = mission("loss = { bernoulli = { probability = 0.3 } }");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    let n = 20_000;
+    for seq in 0..n {
+        emulator.handle(seconds(f64::from(seq) * 1e-3), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+        emulator.handle(seconds(f64::from(seq) * 1e-3), None);
+        drain(&mut emulator);
+    }
+    let lost = emulator.ledgers().next().map_or(0, |ledger| ledger.of(Fate::Lost)) as f64 / f64::from(n);
+    // Five standard deviations of the mean of n draws.
+    assert!((lost - 0.3).abs() < 5.0 * (0.3f64 * 0.7 / f64::from(n)).sqrt(), "{lost}");
+}
+
+#[test]
+fn what_is_decided_about_a_message_does_not_depend_on_the_others() {
+    let mission =
+        mission("loss = { bernoulli = { probability = 0.5 } }\ndelay = { jittered = { min_s = 0.1, max_s = 3.0 } }");
+    let fates = |order: &[(usize, u32)]| {
+        let mut emulator = Emulator::new(mission.clone(), None);
+        for (from, seq) in order {
+            emulator.handle(seconds(1.0), Some(Sent { from: *from, bytes: state(&mission, *from as u16, *seq) }));
+        }
+        emulator.handle(seconds(50.0), None);
+        let mut deliveries = deliveries(&drain(&mut emulator));
+        deliveries.sort();
+        deliveries
+    };
+    let alternating: Vec<(usize, u32)> = (0..40).flat_map(|seq| [(0, seq), (1, seq), (2, seq)]).collect();
+    let one_by_one: Vec<(usize, u32)> = (0..3).rev().flat_map(|from| (0..40).map(move |seq| (from, seq))).collect();
+    assert_eq!(fates(&alternating), fates(&one_by_one));
+}
+
+#[test]
+fn garbage_is_counted_and_changes_no_ledger() {
+    let mission = mission("");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    let good = state(&mission, 0, 7);
+    let mut other = CoordinationState::decode(&good).expect("sound");
+    other.mission ^= 1;
+    for (from, bytes, kind) in [
+        (0, b"nonsense".to_vec(), Garbage::Foreign),
+        (0, good[..20].to_vec(), Garbage::Malformed),
+        (0, vec![b'C'; 5000], Garbage::Oversized),
+        (0, other.encode(), Garbage::WrongMission),
+        (1, good.to_vec(), Garbage::Forged),
+    ] {
+        emulator.handle(seconds(1.0), Some(Sent { from, bytes: bytes.into() }));
+        assert_eq!(emulator.garbage()[from].of(kind), 1, "{kind:?}");
+    }
+    assert!(emulator.ledgers().all(|ledger| ledger.sent == 0));
+    emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: good.clone() }));
+    emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: good }));
+    assert_eq!(emulator.garbage()[0].of(Garbage::Stale), 1, "said twice");
+    assert_eq!(emulator.totals()[0], 1);
+}
+
+#[test]
+fn a_full_queue_drops_new_messages_with_a_count() {
+    let mission = mission("queue = 3\ndelay = { constant = { delay_s = 50.0 } }");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for seq in 0..10 {
+        emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+    }
+    let ledger = emulator.ledgers().next().copied().expect("a link");
+    assert_eq!((ledger.sent, ledger.of(Fate::QueueFull), ledger.in_flight), (10, 7, 3));
+}
+
+/// A state whose ξ puts the sender that far along its line.
+fn state_at(mission: &Mission, sender: u16, seq: u32, xi: f64) -> Arc<[u8]> {
+    CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi, scalar: None }.encode().into()
+}
+
+/// The directed links of the mission, in its order.
+const LINKS: [(&str, &str); 4] = [("v1", "v2"), ("v2", "v1"), ("v2", "v3"), ("v3", "v2")];
+
+/// What became of the messages on the link between two vehicles, by number.
+fn fates(outputs: &[Channel], from: &str, to: &str) -> Vec<(u64, Fate)> {
+    let fate = |output: &Channel| match output {
+        Channel::Settled(settled) if LINKS[settled.link] == (from, to) => Some((settled.seq, settled.fate)),
+        _ => None,
+    };
+    let mut fates: Vec<(u64, Fate)> = outputs.iter().filter_map(fate).collect();
+    fates.sort_unstable();
+    fates
+}
+
+/// Everything that comes of messages (when [s], who, number), each taken at its instant.
+fn run(mission: &Arc<Mission>, words: &[(f64, u16, u32)], end: f64) -> (Emulator, Vec<Channel>) {
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for (at, who, seq) in words {
+        emulator.handle(seconds(*at), None);
+        emulator.handle(seconds(*at), Some(Sent { from: usize::from(*who), bytes: state(mission, *who, *seq) }));
+    }
+    emulator.handle(seconds(end), None);
+    let outputs = drain(&mut emulator);
+    (emulator, outputs)
+}
+
+#[test]
+fn sound_takes_its_time_from_where_the_sender_is() {
+    let mission = mission("delay = { distance = { speed_mps = 1500.0, extra_s = 0.5 } }");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    // v2 lies still at x = 0; v1 is at x = 3000 m on a line 1 m beside when it speaks.
+    emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state_at(&mission, 0, 0, 3000.0) }));
+    emulator.handle(seconds(10.0), None);
+    let due = seconds(1.5) + Span::from_secs(3000f64.hypot(1.0) / 1500.0);
+    assert_eq!(deliveries(&drain(&mut emulator)), vec![(1, due)]);
+}
+
+#[test]
+fn a_message_is_heard_within_its_range_and_not_beyond() {
+    let mission = mission("range = { disc = { radius_m = 100.0 } }");
+    for (xi, fate) in [(99.0, Fate::Delivered), (101.0, Fate::OutOfRange), (f64::MAX, Fate::OutOfRange)] {
+        let mut emulator = Emulator::new(mission.clone(), None);
+        emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state_at(&mission, 0, 0, xi) }));
+        emulator.handle(seconds(1.0), None);
+        assert_eq!(fates(&drain(&mut emulator), "v1", "v2"), vec![(0, fate)], "at {xi} m");
+    }
+}
+
+#[test]
+fn ranges_may_differ_by_direction() {
+    let mission = mission(
+        "range = { disc = { radius_m = 10.0 } }\n\
+         exceptions = [{ from = \"v1\", to = \"v2\", range = { disc = { radius_m = 1000.0 } } }]",
+    );
+    let mut emulator = Emulator::new(mission.clone(), None);
+    emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state_at(&mission, 0, 0, 500.0) }));
+    emulator.handle(seconds(2.0), Some(Sent { from: 1, bytes: state_at(&mission, 1, 0, 0.0) }));
+    emulator.handle(seconds(2.0), None);
+    let outputs = drain(&mut emulator);
+    assert_eq!(fates(&outputs, "v1", "v2"), vec![(0, Fate::Delivered)]);
+    assert_eq!(fates(&outputs, "v2", "v1"), vec![(0, Fate::OutOfRange)]);
+}
+
+#[test]
+fn a_success_curve_thins_messages_out() {
+    let mission = mission("range = { curve = { points = [[0.0, 1.0], [1000.0, 0.0]] } }");
+    let n = 5000;
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for seq in 0..n {
+        let now = seconds(f64::from(seq) * 1e-2);
+        emulator.handle(now, Some(Sent { from: 0, bytes: state_at(&mission, 0, seq, 400.0) }));
+        emulator.handle(now, None);
+    }
+    let ledger = emulator.ledgers().next().copied().expect("a link");
+    let heard = ledger.delivered() as f64 / f64::from(n);
+    // Probability 0.6 over 400 m; five standard deviations.
+    assert!((heard - 0.6).abs() < 5.0 * (0.6f64 * 0.4 / f64::from(n)).sqrt(), "{heard}");
+    assert_eq!(ledger.of(Fate::OutOfRange) + ledger.delivered(), u64::from(n));
+}
+
+#[test]
+fn in_order_no_message_overtakes_an_earlier_one() {
+    let jitter = "delay = { jittered = { min_s = 0.0, max_s = 5.0 } }";
+    for (order, sorted) in [("free", false), ("in_order", true)] {
+        let mission = mission(&format!("{jitter}\norder = \"{order}\"\nduplicate_probability = 0.3"));
+        let words: Vec<(f64, u16, u32)> = (0..200).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
+        let (_, outputs) = run(&mission, &words, 60.0);
+        let arrived = |output: &Channel| match output {
+            Channel::Settled(settled) => Some((settled.due_ns, settled.seq)),
+            _ => None,
+        };
+        let arrived: Vec<(i64, u64)> = outputs.iter().filter_map(arrived).collect();
+        assert_eq!(arrived.iter().map(|(_, seq)| seq).is_sorted(), sorted, "{order}");
+        assert!(arrived.iter().map(|(due, _)| due).is_sorted());
+    }
+}
+
+#[test]
+fn losses_in_bursts_come_at_their_share() {
+    let mission = mission("loss = { gilbert_elliott = { mean_burst = 5.0, mean_gap = 15.0 } }");
+    let n = 20_000;
+    let words: Vec<(f64, u16, u32)> = (0..n).map(|seq| (f64::from(seq) * 1e-3, 0, seq)).collect();
+    let (emulator, _) = run(&mission, &words, 30.0);
+    let lost = emulator.ledgers().next().map_or(0, |ledger| ledger.of(Fate::Lost)) as f64 / f64::from(n);
+    // Bursts of five make about n/10 independent messages of n.
+    assert!((lost - 0.25).abs() < 5.0 * (0.25f64 * 0.75 * 10.0 / f64::from(n)).sqrt(), "{lost}");
+}
+
+#[test]
+fn a_common_fade_takes_the_same_messages_from_all_links() {
+    let mission = mission("loss = { shared_fades = { probability = 0.4, mean_burst = 4.0 } }");
+    let words: Vec<(f64, u16, u32)> =
+        (0..300).flat_map(|seq| (0..3).map(move |who| (f64::from(seq) * 0.1, who, seq))).collect();
+    let (_, outputs) = run(&mission, &words, 60.0);
+    let one = fates(&outputs, "v1", "v2");
+    assert!(one.iter().any(|(_, fate)| *fate == Fate::Lost) && one.iter().any(|(_, fate)| *fate == Fate::Delivered));
+    assert_eq!(one, fates(&outputs, "v2", "v1"));
+    assert_eq!(one, fates(&outputs, "v3", "v2"));
+}
+
+#[test]
+fn further_models_come_on_top() {
+    let mission = mission(
+        "delay = { constant = { delay_s = 1.0 } }\nloss = { trace = { runs = [1, 1] } }\n\
+         also = [{ links = [[\"v1\", \"v2\"]], delay = { constant = { delay_s = 0.5 } }, loss = { trace = { runs = [2, 1] } } }]",
+    );
+    let words: Vec<(f64, u16, u32)> = (0..6).map(|seq| (f64::from(seq), 0, seq)).collect();
+    let (_, outputs) = run(&mission, &words, 60.0);
+    let delivered: Vec<u64> =
+        fates(&outputs, "v1", "v2").iter().filter(|f| f.1 == Fate::Delivered).map(|f| f.0).collect();
+    // Odd messages are lost by the first trace, the third of every three by the second.
+    assert_eq!(delivered, [0, 4]);
+    assert_eq!(deliveries(&outputs), vec![(1, seconds(1.5)), (1, seconds(5.5))]);
+}
+
+#[test]
+fn a_second_copy_is_delivered_and_has_a_ledger_of_its_own() {
+    let mission = mission("delay = { jittered = { min_s = 0.1, max_s = 0.3 } }\nduplicate_probability = 0.25");
+    let n = 4000;
+    let words: Vec<(f64, u16, u32)> = (0..n).map(|seq| (f64::from(seq) * 0.01, 0, seq)).collect();
+    let (emulator, outputs) = run(&mission, &words, 90.0);
+    let ledger = emulator.ledgers().next().copied().expect("a link");
+    assert_eq!(
+        (ledger.sent, ledger.delivered()),
+        (u64::from(n), u64::from(n)),
+        "copies change nothing about what was sent"
+    );
+    assert_eq!((ledger.copies, ledger.copies), (ledger.of(Fate::Copied), ledger.copies));
+    assert_eq!(deliveries(&outputs).len() as u64, ledger.sent + ledger.copies);
+    let share = ledger.copies as f64 / f64::from(n);
+    assert!((share - 0.25).abs() < 5.0 * (0.25f64 * 0.75 / f64::from(n)).sqrt(), "{share}");
+}
+
+#[test]
+fn a_corrupt_message_is_handed_over_with_one_bit_flipped_and_counts_as_dropped() {
+    let mission = mission("corrupt_probability = 0.5");
+    let mut emulator = Emulator::new(mission.clone(), None);
+    let (n, mut flipped, mut bits) = (2000, 0, std::collections::BTreeSet::new());
+    for seq in 0..n {
+        let now = seconds(f64::from(seq) * 0.01);
+        let good = state(&mission, 0, seq);
+        emulator.handle(now, Some(Sent { from: 0, bytes: good.clone() }));
+        emulator.handle(now, None);
+        for output in drain(&mut emulator) {
+            let Channel::Deliver { bytes, .. } = output else { continue };
+            let different: Vec<usize> =
+                (0..8 * good.len()).filter(|bit| (bytes[bit / 8] ^ good[bit / 8]) >> (bit % 8) & 1 == 1).collect();
+            assert!(different.len() <= 1 && bytes.len() == good.len());
+            if !different.is_empty() {
+                assert!(CoordinationState::decode(&bytes).is_err(), "the receiver notices bit {different:?}");
+            }
+            flipped += different.len() as u64;
+            bits.extend(different);
+        }
+    }
+    let ledger = emulator.ledgers().next().copied().expect("a link");
+    assert_eq!((ledger.of(Fate::Corrupt), ledger.dropped()), (flipped, flipped));
+    assert!((flipped as f64 / f64::from(n) - 0.5).abs() < 5.0 * 0.5 / f64::from(n).sqrt(), "{flipped} of {n}");
+    // About a thousand flips over fewer than 400 bits: nearly every bit was hit.
+    assert!(bits.len() > 200, "{} different bits", bits.len());
+}
+
+/// v1, v2 and v3 in a row over a shared medium where a message takes 1 s on the air.
+fn shared(more: &str) -> Arc<Mission> {
+    mission(&format!(
+        "delay = {{ constant = {{ delay_s = 0.25 }} }}\nmedium = {{ rate_bps = 80.0, packet_bytes = 10, {more} }}"
+    ))
+}
+
+#[test]
+fn a_message_takes_its_time_on_the_air_and_the_next_one_waits() {
+    let mission = shared("queue = 2");
+    let (_, outputs) = run(&mission, &[(1.0, 0, 0), (1.5, 0, 1), (1.6, 0, 2), (1.7, 0, 3)], 20.0);
+    assert_eq!(deliveries(&outputs), [2.25, 3.25, 4.25].map(|due| (1, seconds(due))));
+    assert_eq!(fates(&outputs, "v1", "v2")[3], (3, Fate::QueueFull), "one speaks, two wait");
+}
+
+#[test]
+fn a_full_sender_may_drop_what_has_waited_longest() {
+    let mission = shared("queue = 1, when_full = \"drop_old\"");
+    let (emulator, outputs) = run(&mission, &[(1.0, 0, 0), (1.2, 0, 1), (1.4, 0, 2), (1.6, 0, 3)], 20.0);
+    let wanted = [Fate::Delivered, Fate::QueueFull, Fate::QueueFull, Fate::Delivered];
+    assert_eq!(fates(&outputs, "v1", "v2"), (0..).zip(wanted).collect::<Vec<_>>());
+    assert!(emulator.ledgers().all(Ledger::balances));
+}
+
+#[test]
+fn messages_that_overlap_at_a_receiver_destroy_one_another_there_only() {
+    let mission = shared("collisions = true");
+    // v1 and v3 overlap at v2; v2's word is alone at v1 and at v3.
+    let words = [(1.0, 0, 0), (1.9, 2, 0), (5.0, 0, 1), (6.0, 2, 1), (10.0, 1, 0)];
+    let (_, outputs) = run(&mission, &words, 20.0);
+    assert_eq!(fates(&outputs, "v1", "v2"), [(0, Fate::Collision), (1, Fate::Delivered)]);
+    assert_eq!(fates(&outputs, "v3", "v2"), [(0, Fate::Collision), (1, Fate::Delivered)], "end to begin is no overlap");
+    assert_eq!(fates(&outputs, "v2", "v1"), [(0, Fate::Delivered)]);
+    assert_eq!(fates(&outputs, "v2", "v3"), [(0, Fate::Delivered)]);
+}
+
+#[test]
+fn who_speaks_hears_nothing_meanwhile() {
+    for (own, fate) in
+        [(1.0, Fate::HalfDuplex), (2.2, Fate::HalfDuplex), (2.25, Fate::Delivered), (0.2, Fate::Delivered)]
+    {
+        let mission = shared("half_duplex = true, collisions = true");
+        // v1's word arrives at v2 during [1.25, 2.25).
+        let mut words = [(1.0, 0, 0), (own, 1, 0)];
+        words.sort_by(|a: &(f64, u16, u32), b| a.0.total_cmp(&b.0));
+        let (_, outputs) = run(&mission, &words, 20.0);
+        assert_eq!(fates(&outputs, "v1", "v2"), [(0, fate)], "v2 speaks at {own} s");
+    }
+}
+
+#[test]
+fn in_slots_nobody_disturbs_anybody() {
+    let slots = "queue = 5, half_duplex = true, collisions = true, slots = { slot_s = 2.0, guard_s = 0.5 }";
+    let mission = shared(slots);
+    let words: Vec<(f64, u16, u32)> =
+        (0..4).flat_map(|seq| (0..3).map(move |who| (f64::from(seq) * 6.0, who, seq))).collect();
+    let (emulator, outputs) = run(&mission, &words, 60.0);
+    assert!(emulator.ledgers().all(|ledger| ledger.delivered() == 4 && ledger.dropped() == 0));
+    // Slots of v1, v2, v3 begin at 0, 2 and 4 s of every 6 s; 1 s on the air, 0.25 s under way.
+    let first: Vec<(usize, Time)> = deliveries(&outputs).into_iter().take(4).collect();
+    assert_eq!(first, [(1, 1.25), (0, 3.25), (2, 3.25), (1, 5.25)].map(|(to, due)| (to, seconds(due))));
+}
+
+#[test]
+fn without_slots_those_who_speak_together_collide_unless_they_wait_at_random() {
+    let words: Vec<(f64, u16, u32)> =
+        (0..50).flat_map(|seq| [0, 2].map(move |who| (f64::from(seq) * 10.0, who, seq))).collect();
+    let collided = |more: &str| {
+        let (emulator, _) = run(&shared(&format!("collisions = true, {more}")), &words, 1000.0);
+        emulator.ledgers().map(|ledger| ledger.of(Fate::Collision)).sum::<u64>()
+    };
+    assert_eq!(collided("backoff_s = 0.0"), 100);
+    // Two uniform waits within 8 s overlap within 1 s with probability 1 − (7/8)² = 0.234; five standard deviations.
+    let share = collided("backoff_s = 8.0") as f64 / 100.0;
+    assert!((share - 0.234).abs() < 5.0 * (0.234f64 * 0.766 / 50.0).sqrt(), "{share}");
+}
+
+#[test]
+fn a_duty_cycle_keeps_a_sender_silent() {
+    let mission = shared("queue = 10, duty_cycle = 0.1");
+    let (_, outputs) = run(&mission, &[(1.0, 0, 0), (1.0, 0, 1), (1.0, 0, 2)], 60.0);
+    assert_eq!(deliveries(&outputs), [2.25, 12.25, 22.25].map(|due| (1, seconds(due))));
+}
+
+#[test]
+fn what_waits_at_the_end_is_in_flight() {
+    let mission = shared("queue = 10");
+    let (mut emulator, _) = run(&mission, &[(1.0, 0, 0), (1.0, 0, 1), (1.0, 0, 2)], 2.5);
+    emulator.finish(seconds(2.5));
+    assert_eq!(fates(&drain(&mut emulator), "v1", "v2"), [(1, Fate::InFlight), (2, Fate::InFlight)]);
+    assert_eq!(emulator.totals(), [3, 1, 0, 2]);
+}
+
+/// Networks of every kind, at random.
+fn any_network() -> impl Strategy<Value = String> {
+    let delay = prop_oneof![
+        Just("\"none\""),
+        Just("{ constant = { delay_s = 0.7 } }"),
+        Just("{ jittered = { min_s = 0.2, max_s = 2.0 } }"),
+        Just("{ normal = { mean_s = 1.0, deviation_s = 0.5, min_s = 0.3 } }"),
+        Just("{ gamma = { mean_s = 1.0, deviation_s = 0.5, min_s = 0.1 } }"),
+        Just("{ distance = { speed_mps = 20.0, extra_s = 0.2 } }"),
+    ];
+    let loss = prop_oneof![
+        Just("\"none\""),
+        Just("{ bernoulli = { probability = 0.3 } }"),
+        Just("{ gilbert_elliott = { mean_burst = 3.0, mean_gap = 5.0, lost_in_burst = 0.9, lost_in_gap = 0.1 } }"),
+        Just("{ shared_fades = { probability = 0.3, mean_burst = 2.0, correlation = 0.7 } }"),
+        Just("{ trace = { runs = [3, 1, 2, 2] } }"),
+    ];
+    let range = prop_oneof![
+        Just("\"unlimited\""),
+        Just("{ disc = { radius_m = 25.0 } }"),
+        Just("{ curve = { points = [[0.0, 1.0], [40.0, 0.2]] } }"),
+    ];
+    let switching = prop_oneof![
+        Just("\"always\""),
+        Just("{ periodic = { period_s = 3.0, up_from_s = 1.0, up_for_s = 2.0 } }"),
+        Just("{ random = { alpha = 0.5, t_0_s = 2.0, dwell_s = 0.5 } }"),
+        Just("{ markov = { mean_up_s = 2.0, mean_down_s = 1.0 } }"),
+        Just("{ connected_in_mean = { window_s = 8.0, dwell_s = 0.5 } }"),
+        Just("{ one_at_a_time = { dwell_s = 1.5 } }"),
+    ];
+    let medium = prop_oneof![
+        2 => Just(""),
+        1 => Just("medium = { rate_bps = 800.0, packet_bytes = 20, collisions = true, half_duplex = true, backoff_s = 0.4 }"),
+        1 => Just("medium = { rate_bps = 800.0, queue = 2, when_full = \"drop_old\", half_duplex = true, duty_cycle = 0.5 }"),
+        1 => Just("medium = { rate_bps = 2000.0, collisions = true, slots = { slot_s = 0.7, guard_s = 0.1 }, queue = 3 }"),
+    ];
+    let more = prop_oneof![
+        Just(""),
+        Just("order = \"in_order\""),
+        Just("duplicate_probability = 0.3\ncorrupt_probability = 0.2"),
+        Just(
+            "also = [{ links = [[\"v1\", \"v2\"]], delay = { jittered = { min_s = 0.1, max_s = 0.5 } }, switching = { markov = { mean_up_s = 3.0, mean_down_s = 1.0 } } }]"
+        ),
+    ];
+    (delay, loss, range, switching, medium, more, 1u32..30).prop_map(
+        |(delay, loss, range, switching, medium, more, queue)| {
+            format!(
+                "delay = {delay}\nloss = {loss}\nrange = {range}\nswitching = {switching}\nqueue = {queue}\n{medium}\n{more}"
+            )
+        },
+    )
+}
+
+/// Words at multiples of 100 ms, each by some vehicles that move as they speak.
+fn say(mission: &Mission, step: u32, vehicles: &[bool]) -> Vec<(Time, Sent)> {
+    let at = Time::from_nanos(i64::from(step) * 100_000_000);
+    let who = (0..3u16).filter(|who| vehicles[usize::from(*who)]);
+    who.map(|who| {
+        let bytes = state_at(mission, who, step, f64::from(step) * (f64::from(who) - 1.0));
+        (at, Sent { from: usize::from(who), bytes })
+    })
+    .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    /// Whatever happens, every ledger balances, nothing is early, and nothing overtakes its instant.
+    #[test]
+    fn ledgers_balance_at_every_instant(
+        network in any_network(), steps in proptest::collection::vec((0usize..4, 0u32..500), 1..200),
+    ) {
+        let mission = mission(&network);
+        let mut emulator = Emulator::new(mission.clone(), None);
+        let mut now = Time::ZERO;
+        let mut seq = [0; 3];
+        let (mut delivered, mut made) = (0, 0);
+        for (who, wait_ms) in steps {
+            now += Span::from_nanos(i64::from(wait_ms) * 1_000_000);
+            if who < 3 {
+                let bytes = state_at(&mission, who as u16, seq[who], f64::from(seq[who]));
+                emulator.handle(now, Some(Sent { from: who, bytes }));
+                seq[who] += 1;
+                made += mission.links.iter().filter(|link| link.from == who).count() as u64;
+            } else {
+                emulator.handle(now, None);
+            }
+            let outputs = drain(&mut emulator);
+            prop_assert!(deliveries(&outputs).iter().all(|(_, due)| *due <= now));
+            prop_assert!(deliveries(&outputs).is_sorted_by_key(|(_, due)| *due));
+            prop_assert!(emulator.ledgers().all(Ledger::balances));
+            delivered += deliveries(&outputs).len() as u64;
+            let [sent, ..] = emulator.totals();
+            prop_assert_eq!(sent, made, "every message is taken for every link, once");
+        }
+        let handed_over = [Fate::Delivered, Fate::Corrupt, Fate::Copied];
+        let told: u64 = emulator.ledgers().map(|l| handed_over.iter().map(|fate| l.of(*fate)).sum::<u64>()).sum();
+        prop_assert_eq!(delivered, told);
+        emulator.finish(now);
+        let under_way: u64 = emulator.ledgers().map(|ledger| ledger.in_flight + ledger.copies_in_flight).sum();
+        let is_under_way = |o: &&Channel| matches!(
+            o, Channel::Settled(settled) if [Fate::InFlight, Fate::CopyInFlight].contains(&settled.fate)
+        );
+        prop_assert_eq!(under_way, drain(&mut emulator).iter().filter(is_under_way).count() as u64);
+    }
+
+    /// What the stepped clock does: settle what is due up to the next word plus the least delay, and only then take what
+    /// was said meanwhile. Row by row, it is what comes of taking each word at its instant.
+    #[test]
+    fn settling_as_far_ahead_as_allowed_changes_nothing(
+        network in any_network(), said in proptest::collection::vec(proptest::array::uniform3(any::<bool>()), 20..80),
+        window in 1u32..100,
+    ) {
+        let mission = mission(&network);
+        let words = |step: u32| said.get(step as usize).map_or(Vec::new(), |who| say(&mission, step, who));
+        let (steps, at) = (said.len() as u32, |step: u32| Time::from_nanos(i64::from(step) * 100_000_000));
+        let mut one_by_one = Emulator::new(mission.clone(), None);
+        for step in 0..steps {
+            one_by_one.handle(at(step) - Span::from_nanos(1), None);
+            words(step).into_iter().for_each(|(at, sent)| one_by_one.handle(at, Some(sent)));
+        }
+        one_by_one.handle(seconds(60.0), None);
+
+        let mut ahead = Emulator::new(mission.clone(), None);
+        let mut next = 0;
+        while next < steps {
+            let horizon = at(next) + mission.least_delay();
+            while let Some(due) = ahead.poll_timeout().filter(|due| *due < horizon) {
+                ahead.handle(due, None);
+            }
+            // Everyone speaks until the horizon, or until the window ends.
+            let first = next;
+            while next < steps && next < first + window && (next == first || at(next) <= horizon) {
+                words(next).into_iter().for_each(|(at, sent)| ahead.handle(at, Some(sent)));
+                next += 1;
+            }
+        }
+        ahead.handle(seconds(60.0), None);
+
+        let rows = |emulator: &mut Emulator| {
+            let mut rows: Vec<String> = drain(emulator).iter().map(|output| format!("{output:?}")).collect();
+            rows.sort();
+            rows
+        };
+        prop_assert_eq!(rows(&mut one_by_one), rows(&mut ahead));
+    }
+}
