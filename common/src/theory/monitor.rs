@@ -344,11 +344,11 @@ mod tests {
         let covered = watch(&Watched::Dynamic(1.0, 1.6), &graphs, seen);
         assert_eq!(covered.covered_by, Some("Lemma 4.7"));
         assert!(covered.margins[0].left() > 0.0 && covered.envelope.is_some());
-        // The lemma does not bear every loss rate: the same gains, hardly ever connected.
+        // With the X that is found it bears this loss rate too, where that of (4.66) does not.
         let (graphs, rarely) = row_of_three(0.02, 1000.0);
         let watch = watch(&Watched::Dynamic(1.0, 0.05), &graphs, rarely);
-        assert_eq!(watch.covered_by, None, "{watch:?}");
-        assert!(watch.failing().is_some_and(|margin| margin.statement == "Lemma 4.7" && margin.left() < 0.0));
+        assert!(watch.margins[0].holds() && watch.margins[0].limit <= 1.0, "{watch:?}");
+        assert!(Dynamic::new(1.0, 0.05, &graphs).is_some_and(|fleet| !fleet.printed_holds()));
     }
 
     #[test]
