@@ -51,6 +51,9 @@ enum What {
         /// JSON for a pipe
         #[arg(long)]
         json: bool,
+        /// Also draw what theory gives without a run, as SVG files
+        #[arg(long, value_name = "DIR")]
+        figures: Option<PathBuf>,
     },
     /// Fly a mission in one thread, as fast as it goes
     Simulate {
@@ -271,7 +274,7 @@ pub fn main(cli: Cli) -> ExitCode {
 
 fn run(what: What) -> Ended {
     match what {
-        What::Check { mission, json } => check(&mission, json),
+        What::Check { mission, json, figures } => check(&mission, json, figures.as_deref()),
         What::Simulate { mission, out, sets, seed, json } => simulate(&mission, out.as_deref(), &sets, seed, json),
         What::Sweep { mission, sets, repeat, measure, out } => sweep(&mission, &sets, repeat, &measure, out),
         What::Study { study: path, out } => study(&path, out),
@@ -310,13 +313,18 @@ fn read_bounded(path: &Path) -> std::io::Result<String> {
     Ok(text)
 }
 
-fn check(path: &Path, json: bool) -> Ended {
+fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
     let mission = load(path)?;
     let rows = theory::rows(&mission, None);
     if json {
         let rows: Vec<_> = rows
             .iter()
-            .map(|row| serde_json::json!({"name": row.name, "condition": row.condition, "holds": row.holds, "predicted": row.predicted}))
+            .map(|row| {
+                serde_json::json!({
+                    "name": row.name, "condition": row.condition, "value": row.value, "holds": row.holds,
+                    "predicted": row.predicted, "guaranteed_rate": row.guaranteed_rate,
+                })
+            })
             .collect();
         let digest = format!("{:016x}", mission.digest);
         bus::tell!("{:#}", serde_json::json!({"mission": mission.name, "digest": digest, "theory": rows}));
@@ -330,33 +338,49 @@ fn check(path: &Path, json: bool) -> Ended {
         );
         print_theory(&rows);
     }
+    if let Some(folder) = figures {
+        draw(&mission, folder).map_err(|error| End(4, format!("cannot draw in {}: {error}", folder.display())))?;
+    }
     warn(&rows);
     Ok(ExitCode::SUCCESS)
+}
+
+fn draw(mission: &Mission, folder: &Path) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for figure in theory::figures(mission) {
+        let path = folder.join(figure.name).with_extension("svg");
+        std::fs::write(&path, &figure.svg)?;
+        bus::remark!("{}: {}", path.display(), figure.caption);
+    }
+    Ok(())
 }
 
 /// A mission that violates a condition flies, with a warning that names it.
 fn warn(rows: &[TheoryRow]) {
     for row in rows.iter().filter(|row| row.holds == Some(false)) {
-        bus::remark!("warning: not covered by theory: {}: needs {}", row.name, row.condition);
+        let here = if row.value.is_empty() { String::new() } else { format!("; here: {}", row.value) };
+        bus::remark!("warning: not covered by theory: {}: needs {}{here}", row.name, row.condition);
     }
 }
 
 fn print_theory(rows: &[TheoryRow]) {
     for row in rows {
         let holds = match row.holds {
-            Some(true) => "holds",
-            Some(false) => "does not hold",
+            Some(true) => "  [holds]",
+            Some(false) => "  [does not hold]",
             None => "",
         };
-        bus::tell!(
-            "  {}\n      needs {} {}\n      predicts {}",
-            row.name,
-            row.condition,
-            if holds.is_empty() { String::new() } else { format!("[{holds}]") },
-            row.predicted
-        );
-        if row.measured != "–" {
-            bus::tell!("      measured {}", row.measured);
+        bus::tell!("  {}{holds}", row.name);
+        let lines = [
+            ("needs", &row.condition),
+            ("here", &row.value),
+            ("predicts", &row.predicted),
+            ("measured", &row.measured),
+        ];
+        for (label, text) in lines {
+            if !text.is_empty() && text != "–" {
+                bus::tell!("      {label:<9} {text}");
+            }
         }
     }
 }

@@ -50,7 +50,8 @@ fn exchange(line: &Line, events: &Events<LineEvent>, question: &ToFleet) -> Resu
 pub fn describe(status: &FleetStatus) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
-    let name = common::mission::Mission::parse("the mission", &status.mission).map_or("no mission".into(), |m| m.name);
+    let mission = common::mission::Mission::parse("the mission", &status.mission).ok();
+    let name = mission.as_ref().map_or("no mission", |mission| &mission.name);
     let _ = writeln!(
         text,
         "{name}: {} at {:.1} of {:.1} s, formation speed {}",
@@ -61,6 +62,9 @@ pub fn describe(status: &FleetStatus) -> String {
     );
     let [sent, delivered, dropped, in_flight] = status.messages;
     let _ = writeln!(text, "messages: {sent} sent = {delivered} delivered + {dropped} dropped + {in_flight} in flight");
+    if let Some(words) = mission.as_ref().and_then(|mission| crate::theory::so_far(mission, status.now)) {
+        let _ = writeln!(text, "{words}");
+    }
     for vehicle in &status.vehicles {
         let line = if vehicle.connected { "connected" } else { "not connected" };
         let reason = if vehicle.reason.is_empty() { String::new() } else { format!(": {}", vehicle.reason) };

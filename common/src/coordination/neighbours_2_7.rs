@@ -8,7 +8,7 @@ use crate::positive::positive;
 /// v_1^c = R_1 v_L.
 ///
 /// On circles and lines, over any two-way connected graph, it agrees at v_L for every b_0 > 0 if ab > c
-/// (docs/errata.md, result vii).
+/// (docs/errata.md, result x).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbours {
     told: usize,
@@ -130,7 +130,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// Result vii: no mode grows, for every connected graph and every b_0, if ab > c. (One stands: the place of the fleet.)
+        /// Result x: no mode grows, for every connected graph and every b_0, if ab > c. (One stands: the place of the fleet.)
         #[test]
         fn every_connected_graph_will_do(graph in any_connected(), b_0 in 0.05..20.0f64, a in 0.5..4.0f64, b in 0.5..4.0f64,
                                          part in 0.05..0.95f64) {

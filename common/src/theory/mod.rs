@@ -13,6 +13,7 @@
 //! | late information | Theorem 4.3, Lemmas 4.4, 4.5; errata 4.1–4.3 | agreement at v_L* = v_L/(1 + kτ) | [`delay`] |
 //! | how fast, on a fixed network | (4.40) | the rightmost root | [`delay_rate`] |
 //! | coordination with a state of its own | Lemmas 4.2, 4.6, 4.7, Theorems 4.8, 4.9, (4.63)–(4.66); errata 4.19, 4.20 | V at (1 − α)λ_c − αλ_d, norms at half | [`lemma_4_6`] |
+//! | all of these over a run as measured | Definitions 4.3, 4.4, Theorems 4.4, 4.5, Lemma 4.7 | covered, not covered and by how much, or a defect | [`monitor`] |
 //!
 //! Quadratic functions such as V decay at twice the rate of the norms of errors (erratum 4.4). Rates of norms are what
 //! can be laid beside a measurement, so [`Verdict::norm_rate`] is always one of those.
@@ -26,6 +27,7 @@ pub mod gateway_2_35;
 pub mod lemma_1_1;
 pub mod lemma_4_6;
 pub mod linear_coordination;
+pub mod monitor;
 pub mod polynomial;
 pub mod proposition_3_4;
 pub mod proposition_3_6;
@@ -89,5 +91,38 @@ impl Gains {
         let k_m = gains.iter().copied().fold(f64::INFINITY, f64::min);
         let k_max = gains.iter().copied().fold(0.0, f64::max);
         valid.then_some(Gains { n: gains.len(), k_m, k_max })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    #[test]
+    fn every_path_in_the_index_exists() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace");
+        let index = include_str!("../../../docs/theory.md");
+        let quoted = index.split('`').skip(1).step_by(2).filter(|text| text.ends_with(".rs"));
+        let (mut count, mut missing) = (0, Vec::new());
+        for path in quoted {
+            let found = root.join("common/src").join(path).exists() || root.join(path).exists();
+            // A module is a file or a folder, as it grows.
+            let folder = root.join("common/src").join(path.trim_end_matches(".rs")).join("mod.rs").exists();
+            if !(found || folder) {
+                missing.push(path);
+            }
+            count += 1;
+        }
+        assert!(count > 40 && missing.is_empty(), "{count} paths, missing: {missing:?}");
+    }
+
+    #[test]
+    fn every_file_about_theory_is_in_the_index() {
+        let index = include_str!("../../../docs/theory.md");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/theory");
+        for entry in std::fs::read_dir(folder).expect("lists") {
+            let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
+            assert!(index.contains(&format!("`theory/{name}`")), "{name} is not in docs/theory.md");
+        }
     }
 }

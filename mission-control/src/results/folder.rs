@@ -19,7 +19,7 @@ pub struct Account {
     pub reproduce: Vec<String>,
 }
 
-/// Writes `summary.json`, `clock.json`, `figures/*.svg` and `report.html` into a run folder. Each file appears whole
+/// Writes `summary.json`, `theory.json`, `clock.json`, `figures/*.svg` and `report.html` into a run folder. Each file appears whole
 /// or not at all, and replaces an earlier one, so that a report can be made again at any time. `theory` is asked for
 /// its table once the measured numbers are known. A failure names the file.
 pub fn write_run_folder(
@@ -31,13 +31,13 @@ pub fn write_run_folder(
 ) -> io::Result<Summary> {
     let directory = directory.as_ref();
     let (summary, clock) = (summarise(recording, facts), summarise_clock(recording));
-    let figures = figures(recording, facts);
+    let (figures, theory) = (figures(recording, facts), theory(&summary));
     let page = report(&Report {
         facts,
         summary: &summary,
         clock: &clock,
         figures: &figures,
-        theory: &theory(&summary),
+        theory: &theory,
         notes: &account.notes,
         reproduce: &account.reproduce,
         mission_toml: &recording.mission_toml,
@@ -48,6 +48,7 @@ pub fn write_run_folder(
         write(&drawings.join(figure.name).with_extension("svg"), figure.svg.as_bytes())?;
     }
     write(&directory.join("summary.json"), &json(&summary)?)?;
+    write(&directory.join("theory.json"), &json(&theory)?)?;
     write(&directory.join("clock.json"), &json(&clock)?)?;
     write(&directory.join("report.html"), page.as_bytes())?;
     Ok(summary)
@@ -90,6 +91,7 @@ mod tests {
                 holds: Some(true),
                 predicted: "rate ≥ 0.012 /s".into(),
                 measured: format!("{fitted:.4} /s"),
+                ..TheoryRow::default()
             },
             TheoryRow {
                 name: "Formation speed".into(),
@@ -97,6 +99,7 @@ mod tests {
                 holds: None,
                 predicted: "0.5 /s".into(),
                 measured: format!("{:.4} /s", summary.fleet.steady_speed),
+                ..TheoryRow::default()
             },
         ]
     }
@@ -126,7 +129,7 @@ mod tests {
         write_fleet(directory.path(), true);
         let first = files(directory.path());
         let names: Vec<_> = first.iter().map(|(name, _)| name.to_string_lossy().into_owned()).collect();
-        assert_eq!(names, ["clock.json", "report.html", "summary.json"]);
+        assert_eq!(names, ["clock.json", "report.html", "summary.json", "theory.json"]);
         assert_eq!(files(&directory.path().join("figures")).len(), 3);
         write_fleet(directory.path(), true);
         assert!(files(directory.path()) == first, "the same recording gives the same files");

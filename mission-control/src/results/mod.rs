@@ -4,11 +4,13 @@
 //! |---|---|
 //! | [`summarise`], [`summarise_clock`] | `summary.json` (a function of mission and seed), `clock.json` (of the machine) |
 //! | [`figures()`] | SVG figures in the arrangement of the thesis |
+//! | [`Chart`] | a figure of given curves |
 //! | [`report()`] | `report.html`, one self-contained file |
 //! | [`write_run_folder`] | all of these into a run folder, each file whole or not at all |
 //! | [`export_csv`] | `vehicles.csv`, `links.csv`, `topology.csv` |
 //! | [`diff()`] | *equal*, or the first row in which two runs part |
 
+mod chart;
 mod diff;
 pub(crate) mod drawing;
 mod export;
@@ -24,6 +26,7 @@ mod summary;
 pub(crate) mod testing;
 mod trace;
 
+pub use chart::{Chart, Curve};
 pub use diff::{Outcome, Side, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts};

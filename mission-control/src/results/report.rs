@@ -2,21 +2,27 @@
 
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 use super::drawing::{GRID, INK, PAPER};
 use super::summary::PATH_THRESHOLD_M;
 use super::{ClockSummary, Facts, Figure, LinkSummary, Summary, VehicleSummary};
 
 /// A line of the table "theory beside measurement".
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TheoryRow {
     /// The theorem or quantity.
     pub name: String,
-    /// What it requires, with the numbers of this mission.
+    /// What it requires.
     pub condition: String,
+    /// What is the case in this mission.
+    pub value: String,
     /// Whether the mission meets the condition; `None` if there is none to meet.
     pub holds: Option<bool>,
-    /// What it predicts.
+    /// What it predicts or guarantees.
     pub predicted: String,
+    /// The rate at which the norm of the coordination error decays if it guarantees one \[1/s\].
+    pub guaranteed_rate: Option<f64>,
     /// What was measured.
     pub measured: String,
 }
@@ -150,16 +156,16 @@ fn theory(page: &mut String, rows: &[TheoryRow]) {
         return;
     }
     page.push_str("<section>\n<h2>Theory beside measurement</h2>\n");
-    let header = ["result", "condition", "holds", "predicted", "measured"];
+    let header = ["statement", "condition", "here", "holds", "guaranteed", "measured"];
     let rows = rows.iter().map(|row| {
         let holds = match row.holds {
             Some(true) => "<span class=\"yes\">yes</span>",
             Some(false) => "<span class=\"no\">no</span>",
             None => "–",
         };
-        let text = [&row.name, &row.condition, &row.predicted, &row.measured].map(|text| escape(text));
-        let [name, condition, predicted, measured] = text;
-        vec![name, condition, holds.into(), predicted, measured]
+        let text = [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(text));
+        let [name, condition, value, predicted, measured] = text;
+        vec![name, condition, value, holds.into(), predicted, measured]
     });
     table(page, "prose", &header, rows);
     page.push_str("</section>\n");

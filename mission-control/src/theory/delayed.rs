@@ -3,6 +3,7 @@
 use common::mission::Mission;
 use common::mission::file::{Delayed, LawChoice};
 use common::theory::delay::{self, DelayGains};
+use common::theory::delay_rate;
 use common::time::Span;
 
 use super::Case;
@@ -17,16 +18,31 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
     let bears_losses = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_));
     let always_heard = bears_losses || network.leaves_nobody_alone();
     let told = told_truly(mission, law.delay_s) && mission.loses_by_switching_only();
+    let holds = verdict.holds && always_heard && told;
+    let mut value = verdict.value.clone();
+    if !always_heard {
+        value += "; at times a vehicle hears nobody";
+    }
+    if !told {
+        value += "; messages are lost, or not as late as the law was told";
+    }
+    // On a network that never changes the rate is known exactly.
+    let rate = (holds && network.graphs.len() == 1).then(|| delay_rate::rate(&network.graph, law.gain, tau)).flatten();
     vec![TheoryRow {
-        name: verdict.name.into(),
         condition: if bears_losses {
             format!("{}, every message τ late and none lost but by the switching", verdict.condition)
         } else {
             format!("{}, every vehicle always hears someone, every message τ late", verdict.condition)
         },
-        holds: Some(verdict.holds && always_heard && told),
-        predicted: "exponential agreement, no rate".into(),
-        measured: case.fitted_rate(),
+        value,
+        holds: Some(holds),
+        predicted: match rate {
+            Some(rate) => format!("exponential agreement; ‖e‖ decays at {rate:.5} 1/s (rightmost root of (4.40))"),
+            None if holds => "exponential agreement, no rate".into(),
+            None => "–".into(),
+        },
+        guaranteed_rate: rate,
+        ..case.row(verdict)
     }]
 }
 

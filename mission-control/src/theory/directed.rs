@@ -31,7 +31,7 @@ pub(super) fn rows_of_solution_2(case: &Case<'_>, a: f64, b: f64) -> Vec<TheoryR
     let verdict = Verdict {
         name: "Remark 3.13 for unequal R_i",
         condition: "network fixed, without delay and loss; all modes of (3.65) with (3.83) decay".into(),
-        value: String::new(),
+        value: if rate.is_some() { "they do".into() } else { "not all do, or the network is not fixed".into() },
         holds: rate.is_some(),
         norm_rate: rate,
     };
@@ -51,13 +51,15 @@ pub(super) fn rows_of_a_told_vehicle(case: &Case<'_>, law: &TrulyDecentralised) 
 
 fn row(case: &Case<'_>, verdict: Verdict) -> TheoryRow {
     let constant = constant_r(case.mission).is_some();
-    let value = if verdict.value.is_empty() { String::new() } else { format!(": {}", verdict.value) };
     let rate = verdict.norm_rate.filter(|_| constant);
+    let varying = if constant { "" } else { "; R_i varies along the paths" };
     TheoryRow {
         name: format!("Agreement ({})", verdict.name),
-        condition: format!("constant R_i; {}{value}", verdict.condition),
+        condition: format!("constant R_i; {}", verdict.condition),
+        value: format!("{}{varying}", verdict.value),
         holds: Some(verdict.holds && constant),
         predicted: rate.map_or("–".into(), |rate| format!("slowest mode {rate:.5} 1/s")),
+        guaranteed_rate: rate,
         measured: case.fitted_rate(),
     }
 }

@@ -12,11 +12,20 @@ pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
 }
 
 pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
+    let guarantee = guarantee(case, law);
+    let up: Vec<String> = case.network.up.iter().map(|up| format!("{up:.4}")).collect();
     vec![TheoryRow {
-        name: "Rate of coordination (Lemma 1.1)".into(),
-        condition: "no delay and no loss but the switching".into(),
-        holds: Some(case.network.immediate),
-        predicted: guarantee(case, law).map_or("–".into(), |g| format!("{:.5} 1/s on the paths", g.rate)),
+        name: "Rate of coordination (Lemma 1.1, erratum 1.1)".into(),
+        condition: "heard at times, and nothing late or lost but by the switching".into(),
+        value: format!(
+            "links up for {} of the time, a = {:.4} 1/s{}",
+            up.join(" and "),
+            law.gain,
+            if case.network.immediate { "" } else { "; messages are late or lost" }
+        ),
+        holds: Some(case.network.immediate && guarantee.is_some()),
+        predicted: guarantee.map_or("–".into(), |g| format!("{:.5} 1/s on the paths", g.rate)),
+        guaranteed_rate: guarantee.map(|g| g.rate),
         measured: case.fitted_rate(),
     }]
 }
@@ -27,7 +36,9 @@ pub(super) fn rows_of_a_leader(case: &Case<'_>, law: &LeaderIntegral) -> Vec<The
     vec![TheoryRow {
         name: "One vehicle learns v_L (section 1.2, after (1.5))".into(),
         condition: "fixed two-way link, no delay, no loss, v_L constant".into(),
+        value: if case.network.is_fixed() { "fixed".into() } else { "changes, delays or loses".into() },
         holds: Some(case.network.is_fixed() && case.network.graph.is_undirected()),
+        guaranteed_rate: Some(rate).filter(|_| case.network.is_fixed() && case.network.graph.is_undirected()),
         predicted: format!("{rate:.5} 1/s on the paths"),
         measured: case.fitted_rate(),
     }]

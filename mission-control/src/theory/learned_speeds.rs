@@ -55,12 +55,13 @@ pub(super) fn rows_of_a_gateway(
             holds: Some(true),
             predicted: format!("{:.6}", fleet.steady_error(speed, r(failed), v_1, r(hub))),
             measured: case.measured(|s| format!("{:.6} (largest difference)", s.fleet.coordination.last)),
+            ..TheoryRow::default()
         });
     }
     rows
 }
 
-/// Neighbours in a row: result vii of docs/errata.md.
+/// Neighbours in a row: result x of docs/errata.md.
 pub(super) fn rows_of_a_row(case: &Case<'_>, law: &NeighboursInARow) -> Vec<TheoryRow> {
     let verdict = Verdict {
         name: "neighbours in a row, proven here",
@@ -81,15 +82,18 @@ pub(super) fn rows_of_nothing(case: &Case<'_>, law: &LawChoice) -> Vec<TheoryRow
         holds: None,
         predicted: "–".into(),
         measured: case.fitted_rate(),
+        ..TheoryRow::default()
     }]
 }
 
 fn row(case: &Case<'_>, verdict: Verdict) -> TheoryRow {
     TheoryRow {
         name: format!("Agreement ({})", verdict.name),
-        condition: format!("fixed network, no delay, no loss; {}: {}", verdict.condition, verdict.value),
+        condition: format!("fixed network, no delay, no loss; {}", verdict.condition),
+        value: verdict.value,
         holds: Some(verdict.holds && case.network.is_fixed()),
         predicted: verdict.norm_rate.map_or("agreement".into(), |rate| format!("slowest mode {rate:.5} 1/s")),
+        guaranteed_rate: verdict.norm_rate,
         measured: case.fitted_rate(),
     }
 }

@@ -15,22 +15,31 @@
 //! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
 //! | switching networks | Theorems 4.4, 4.5 | `switching.rs` |
 //! | late information | Lemmas 4.4, 4.5 | `delayed.rs` |
+//! | the run as flown, or so far | Theorems 4.4, 4.5, Lemmas 4.4–4.7 | `watched.rs` |
+//! | curves that need no run | Figure 2.8 and others | [`figures()`] |
 //!
 //! The mathematics is in `common::theory`; here is only which statement speaks of which mission, and in which words.
 
 mod auxiliary;
 mod delayed;
 mod directed;
+mod figures;
 mod fleet;
 mod introduction;
 mod learned_speeds;
 mod network;
 mod solutions;
 mod switching;
+mod watched;
 mod weights_and_patterns;
 
 use common::mission::Mission;
 use common::mission::file::LawChoice;
+use common::theory::Verdict;
+use common::theory::linear_coordination::Law;
+
+pub use figures::figures;
+pub use watched::so_far;
 
 use crate::results::{Summary, TheoryRow};
 use network::Network;
@@ -61,6 +70,23 @@ impl<'a> Case<'a> {
         self.summary.map_or_else(|| "–".to_string(), value)
     }
 
+    /// The row of a statement about how the fleet agrees.
+    fn row(&self, verdict: Verdict) -> TheoryRow {
+        TheoryRow {
+            name: verdict.name.into(),
+            condition: verdict.condition,
+            value: verdict.value,
+            holds: Some(verdict.holds),
+            predicted: match (verdict.norm_rate, verdict.holds) {
+                (Some(rate), _) => format!("‖e‖ decays at ≥ {rate:.5} 1/s"),
+                (None, true) => "agreement, no rate".into(),
+                (None, false) => "–".into(),
+            },
+            guaranteed_rate: verdict.norm_rate,
+            measured: self.fitted_rate(),
+        }
+    }
+
     /// The measured rate of coordination.
     fn fitted_rate(&self) -> String {
         self.measured(|s| s.fleet.coordination.fit.as_ref().map_or("–".into(), |fit| format!("{:.5} 1/s", fit.rate)))
@@ -86,12 +112,14 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
     let case = Case::new(mission, summary);
     let mut rows = vec![fleet::graph(&case)];
     if mission.vehicles.len() > 1 {
+        rows.extend(fleet::spectrum(&case));
         rows.push(fleet::losses(&case));
         rows.push(fleet::connected_in_mean(&case));
         rows.extend(law_rows(&case));
     }
     rows.push(fleet::speed(&case));
     rows.extend(fleet::bias(&case));
+    rows.extend(watched::row(&case));
     rows
 }
 
@@ -109,17 +137,18 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
         }
         LawChoice::Neighbours(law) => learned_speeds::rows_of_a_row(case, law),
         law @ (LawChoice::Alone(_) | LawChoice::SquareWave(_)) => learned_speeds::rows_of_nothing(case, law),
+        LawChoice::Solution1(law) => solutions::rows(case, Law::SolutionOne { a: law.a }),
         LawChoice::Solution2(law) if !case.network.graph.is_undirected() => {
             directed::rows_of_solution_2(case, law.a, law.b)
         }
+        LawChoice::Solution2(law) => solutions::rows(case, Law::SolutionTwo { a: law.a, b: law.b }),
+        LawChoice::Solution3(law) => solutions::rows(case, Law::SolutionThree { a: law.a, b: law.b }),
         LawChoice::Weighted(_) => weights_and_patterns::rows_of_weights(case),
         LawChoice::MovingPattern(_) => weights_and_patterns::rows_of_a_pattern(case),
         LawChoice::Directed(law) => directed::rows(case, law.a, law.b),
         LawChoice::TrulyDecentralised(law) => directed::rows_of_a_told_vehicle(case, law),
         LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
         LawChoice::AuxiliarySwitching(law) => auxiliary::rows_switching(case, law),
-        LawChoice::Solution1(_) | LawChoice::Solution2(_) => solutions::rows(case, "3.4", "exponential agreement"),
-        LawChoice::Solution3(_) => solutions::rows(case, "3.5", "agreement"),
         LawChoice::Switching(law) => switching::rows(case, law),
         LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),
     }

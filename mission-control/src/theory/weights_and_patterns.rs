@@ -17,12 +17,21 @@ pub(super) fn rows_of_a_pattern(case: &Case<'_>) -> Vec<TheoryRow> {
 }
 
 fn row(case: &Case<'_>, name: &str, more: &str, met: bool, promise: &str) -> TheoryRow {
-    let graph = &case.network.graph;
+    let (graph, fixed) = (&case.network.graph, case.network.is_fixed());
+    let holds = met && fixed && graph.is_undirected() && graph.is_connected();
     TheoryRow {
         name: name.into(),
         condition: format!("{more}fixed two-way connected network, no delay, no loss"),
-        holds: Some(met && case.network.is_fixed() && graph.is_undirected() && graph.is_connected()),
-        predicted: promise.into(),
+        value: format!(
+            "{}, {}, {}{}",
+            if graph.is_undirected() { "two-way" } else { "one-way links" },
+            if graph.is_connected() { "connected" } else { "not connected" },
+            if fixed { "fixed" } else { "changes, delays or loses" },
+            if met { "" } else { ", R_i varies" }
+        ),
+        holds: Some(holds),
+        predicted: if holds { promise.into() } else { "–".into() },
         measured: case.fitted_rate(),
+        ..TheoryRow::default()
     }
 }
