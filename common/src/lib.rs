@@ -14,6 +14,7 @@ pub mod path;
 mod positive;
 pub mod random;
 pub mod record;
+pub mod talk;
 pub mod theory;
 pub mod time;
 pub mod vehicle;

@@ -9,13 +9,17 @@
 //! | switching network | Theorems 4.4 and 4.5 | v_r = v_L − k_i Σ(γ_i − γ_j) (4.21) | rate | γ_j | [`switching_4_21`] |
 //! | delay, never alone | Lemma 4.4 | v_r = v_L − k/\|N_i\| Σ(γ_i − γ_j(t−τ)) (4.34) | rate | γ_j | [`delayed_4_34`] |
 //! | delay, at times alone | Lemma 4.5 | (4.34), and v_L* when N_i is empty (4.42) | rate | γ_j | [`delayed_4_42`] |
+//! | delay, not told | this project; after Lemma 4.5 | (4.42) with v_L* estimated on board | rate | γ_j | [`delayed_4_42_estimating`] |
+//! | delay, known | this project | v_r = v_L − kΣ(γ_i(t−τ_ij) − γ_j(t−τ_ij)) | rate | γ_j and its age | [`known_delay`] |
 //!
 //! What all of them need of the neighbours is in [`disagreement`].
 
 pub mod delayed_4_34;
 pub mod delayed_4_42;
+pub mod delayed_4_42_estimating;
 pub mod disagreement;
 pub mod introduction_1_5;
+pub mod known_delay;
 pub mod solution_1_3_43;
 pub mod solution_2_3_44;
 pub mod solution_3_3_45;

@@ -5,6 +5,8 @@
 //! | two vehicles that switch | Lemma 1.1, (1.6), (1.7); erratum 1.1 | \|x\| decays at (1 − α)a | [`lemma_1_1`] |
 //! | brief connectivity losses | Theorem 4.4; errata 4.4, 4.6 | V at λ_0 − 2αk_mλ_m or min(λ_1, 2(1 − α)k_mλ_m), norms at half | [`theorem_4_4`] |
 //! | connected in mean | Theorems 4.2, 4.5; erratum 4.7 | agreement, with a rate proven here | [`theorem_4_5`] |
+//! | event-triggered talk | this project; (4.21) with beliefs | ‖γ~‖ in the end below √n‖ΠA‖/λ_2 times the error of a belief | [`event_triggered`] |
+//! | known delay | this project | agreement at v_L iff kλ_max τ < π/2, with its rate | [`known_delay`] |
 //! | late information | Theorem 4.3, Lemmas 4.4, 4.5; errata 4.1–4.3 | agreement at v_L* = v_L/(1 + kτ) | [`delay`] |
 //!
 //! Quadratic functions such as V decay at twice the rate of the norms of errors (erratum 4.4). Rates of norms are what
@@ -13,6 +15,8 @@
 use serde::Serialize;
 
 pub mod delay;
+pub mod event_triggered;
+pub mod known_delay;
 pub mod lemma_1_1;
 pub mod theorem_4_4;
 pub mod theorem_4_5;

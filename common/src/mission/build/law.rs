@@ -6,7 +6,9 @@ use super::super::file::LawChoice;
 use crate::coordination::FleetLaw;
 use crate::coordination::delayed_4_34::Delayed;
 use crate::coordination::delayed_4_42::DelayedAlone;
+use crate::coordination::delayed_4_42_estimating::Estimating;
 use crate::coordination::introduction_1_5::Introduction;
+use crate::coordination::known_delay::KnownDelay;
 use crate::coordination::solution_1_3_43::SolutionOne;
 use crate::coordination::solution_2_3_44::SolutionTwo;
 use crate::coordination::solution_3_3_45::SolutionThree;
@@ -24,6 +26,8 @@ pub(in crate::mission) fn law(choice: &LawChoice) -> Result<Arc<dyn FleetLaw>, S
         LawChoice::Switching(g) => Arc::new(Switching::new(g.gain)?),
         LawChoice::Delayed(g) => Arc::new(Delayed::new(g.gain)?),
         LawChoice::DelayedWithLosses(g) => Arc::new(DelayedAlone::new(g.gain, g.delay_s)?),
+        LawChoice::DelayedEstimating(g) => Arc::new(Estimating::new(g.gain, g.time_constant_s)?),
+        LawChoice::KnownDelay(g) => Arc::new(KnownDelay::new(g.gain, g.longest_s)?),
     })
 }
 
@@ -47,5 +51,7 @@ pub(in crate::mission) fn law_name(choice: &LawChoice) -> &'static str {
         LawChoice::Switching(_) => "switching",
         LawChoice::Delayed(_) => "delayed",
         LawChoice::DelayedWithLosses(_) => "delayed_with_losses",
+        LawChoice::DelayedEstimating(_) => "delayed_estimating",
+        LawChoice::KnownDelay(_) => "known_delay",
     }
 }

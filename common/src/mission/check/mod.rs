@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use toml::de::DeTable;
 
-use self::coordination::check_law;
+use self::coordination::{check_law, check_talk};
 use self::network::{check_links, check_switching};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
@@ -62,6 +62,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let times = check_times(faults, file);
     let speed = check_formation(faults, file);
     let law = check_law(faults, file);
+    let talk = check_talk(faults, file, law.as_deref());
     let ids = check_ids(faults, &file.vehicles);
     let links = check_links(faults, file, &ids);
     let switching = check_switching(faults, file, &ids, links.as_deref().unwrap_or(&[]));
@@ -86,6 +87,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         law_choice: file.coordination.law.clone(),
         validity: file.coordination.validity_s.map(Span::from_secs),
         between: file.coordination.between,
+        talk,
         vehicles: vehicles.into_iter().collect::<Option<Vec<_>>>()?,
         links,
         switching,
