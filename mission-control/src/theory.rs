@@ -3,11 +3,11 @@
 use common::graph::Graph;
 use common::graph::measure::Connectivity;
 use common::graph::spectrum;
-use common::mission::file::{FollowingChoice, FollowingType, LawChoice};
+use common::mission::file::{Between, FollowingChoice, FollowingType, LawChoice};
 use common::mission::{Delay, Mission};
 use common::theory::delay::{self, DelayGains};
 use common::theory::theorem_4_4::Coordination;
-use common::theory::{Gains, theorem_4_5};
+use common::theory::{Gains, event_triggered, known_delay, theorem_4_5};
 use common::time::{Span, Time};
 
 use crate::results::{Summary, TheoryRow};
@@ -32,7 +32,7 @@ struct Network {
     graphs: Vec<Graph>,
     /// Share of the time that each directed link is up.
     up: Vec<f64>,
-    /// Without delay and loss, so that what is said is heard at once.
+    /// Without delay and loss, and all is said that there is, so that it is heard at once.
     immediate: bool,
 }
 
@@ -64,7 +64,8 @@ impl Network {
             planned: Connectivity::planned(mission.switching.clone(), n, &arcs, mission.end),
             graphs,
             up,
-            immediate: mission.links.iter().all(|l| l.delay == Delay::Constant(Span::ZERO) && l.loss == 0.0),
+            immediate: mission.talk.is_none()
+                && mission.links.iter().all(|l| l.delay == Delay::Constant(Span::ZERO) && l.loss == 0.0),
         }
     }
 
@@ -121,6 +122,7 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
         rows.push(losses_row(&network, summary));
         rows.push(mean_row(&network));
         rows.extend(law_rows(mission, &network, summary));
+        rows.extend(talk_row(mission, &network, summary));
     }
     rows.push(speed_row(mission, summary));
     rows.extend(bias_row(mission, summary));
@@ -209,6 +211,26 @@ fn law_rows(mission: &Mission, network: &Network, summary: Option<&Summary>) -> 
             row.holds = Some(verdict.holds && always_heard && told);
             row.predicted = "exponential agreement, no rate".into();
         }
+        LawChoice::DelayedEstimating(_) => {
+            row.name = "Agreement at an estimated v_L* (after Lemma 4.5)".into();
+            row.condition = "connected in mean, one constant delay, none lost but by the switching".into();
+            let in_mean = network.planned.connected_in_mean().is_some();
+            row.holds = Some(in_mean && common_delay(mission).is_some() && mission.links.iter().all(|l| l.loss == 0.0));
+            row.predicted = "v_L* is the only rest of the estimate".into();
+        }
+        LawChoice::KnownDelay(law) => {
+            // What was said lately is used until the next word: older by up to a message period and a control period.
+            let held = mission.control_period * (mission.message_ticks + 1);
+            let oldest = mission.links.iter().map(|link| greatest(link.delay)).max().unwrap_or(Span::ZERO) + held;
+            let turn = known_delay::turn(&network.graph, law.gain, oldest);
+            let quiet =
+                network.graphs.len() == 1 && mission.talk.is_none() && mission.links.iter().all(|l| l.loss == 0.0);
+            row.name = "Agreement with known delay".into();
+            row.condition = "fixed two-way network, one delay τ for all links, kλ_max τ < π/2 = 1.571".into();
+            let below = turn.is_some_and(|turn| turn < std::f64::consts::FRAC_PI_2);
+            row.holds = Some(quiet && common_delay(mission).is_some() && below && network.graph.is_connected());
+            row.predicted = turn.map_or("–".into(), |turn| format!("kλ_max τ = {turn:.3} with the oldest news"));
+        }
     }
     vec![row]
 }
@@ -247,6 +269,45 @@ fn switching_rows(mission: &Mission, network: &Network, summary: Option<&Summary
     }
 }
 
+/// What event-triggered talk costs at most.
+fn talk_row(mission: &Mission, network: &Network, summary: Option<&Summary>) -> Option<TheoryRow> {
+    let trigger = mission.talk?;
+    let LawChoice::Switching(law) = &mission.law_choice else { return None };
+    let used = mission.control_period * (mission.message_ticks + 1) + trigger.least_silence();
+    let slowest = mission.links.iter().map(|link| greatest(link.delay)).max().unwrap_or(Span::ZERO);
+    let staleness = (used + slowest).secs();
+    let bound = event_triggered::ultimate_bound(&network.graph, law.gain, trigger.floor(), staleness);
+    let heard = network.graphs.len() == 1 && mission.links.iter().all(|link| link.loss == 0.0);
+    Some(TheoryRow {
+        name: "Coordination error left by event-triggered talk".into(),
+        condition: "fixed two-way network, nothing lost, advance, a small gain, targets that move as told (type II)"
+            .into(),
+        holds: Some(bound.is_some() && heard && mission.between == Between::Advance && moves_as_told(mission)),
+        predicted: bound.map_or("no bound".into(), |b| format!("two vehicles at most {:.4} apart", 2f64.sqrt() * b)),
+        measured: measured(summary, |s| format!("{:.4} in the steady part", s.fleet.coordination.steady_rms)),
+    })
+}
+
+/// The delay that all messages on all links have, if they have.
+fn common_delay(mission: &Mission) -> Option<Span> {
+    let first = mission.links.first()?.delay.least();
+    mission.links.iter().all(|link| link.delay == Delay::Constant(first)).then_some(first)
+}
+
+fn greatest(delay: Delay) -> Span {
+    match delay {
+        Delay::Constant(delay) | Delay::Uniform(_, delay) => delay,
+    }
+}
+
+/// The speed at which the fleet will travel, as a part of v_L, if theory knows it.
+pub fn speed_factor(mission: &Mission) -> Option<f64> {
+    match &mission.law_choice {
+        LawChoice::DelayedEstimating(law) => common_delay(mission).map(|tau| delay::steady_speed(1.0, law.gain, tau)),
+        _ => Some(mission.nominal_factor()),
+    }
+}
+
 /// Whether every vehicle has a neighbour at all times.
 fn never_alone(network: &Network) -> bool {
     network.graphs.iter().all(|graph| (0..graph.len()).all(|i| graph.degree(i) > 0))
@@ -267,7 +328,7 @@ fn speed_row(mission: &Mission, summary: Option<&Summary>) -> TheoryRow {
         name: name.into(),
         condition,
         holds: mission.law_delay().map(|tau| mission.links.iter().all(|link| told_truly(link.delay, tau))),
-        predicted: format!("{:.5} 1/s", mission.nominal_factor() * v_l),
+        predicted: speed_factor(mission).map_or("–".into(), |factor| format!("{:.5} 1/s", factor * v_l)),
         measured: measured(summary, |s| format!("{:.5} 1/s", s.fleet.steady_speed)),
     }
 }

@@ -179,6 +179,10 @@ mod tests {
             ("fig-3-7", FIG_3_7),
             ("fig-3-9", include_str!("../../../../missions/thesis/fig-3-9.toml")),
             ("fig-4-2", include_str!("../../../../missions/thesis/fig-4-2.toml")),
+            ("event-triggered", include_str!("../../../../missions/talk/event-triggered.toml")),
+            ("naive", include_str!("../../../../missions/talk/naive.toml")),
+            ("known-delay", include_str!("../../../../missions/talk/known-delay.toml")),
+            ("estimated-speed", include_str!("../../../../missions/talk/estimated-speed.toml")),
         ] {
             let mission = Mission::parse(name, text).unwrap_or_else(|faults| panic!("{faults}"));
             assert_eq!(mission.name, name);
@@ -242,6 +246,29 @@ mod tests {
             let found = faults_with(old, new);
             assert!(found.iter().any(|line| line.contains(&format!(": {key}"))), "{new:?}: {found:?}");
         }
+    }
+
+    #[test]
+    fn event_triggers_that_make_no_sense_are_refused() {
+        let text = include_str!("../../../../missions/talk/event-triggered.toml");
+        for (old, new, key) in [
+            ("threshold = 0.02", "threshold = 0.0", "coordination.talk.event_triggered"),
+            ("jitter = 0.5", "jitter = 1.0", "coordination.talk.event_triggered"),
+            ("patience_s = 1.5", "patience_s = -1.5", "coordination.talk.event_triggered.patience_s"),
+            ("most_silence_s = 30.0", "most_silence = 30.0", "coordination.talk.event_triggered.most_silence"),
+            ("between =", "validity_s = 30.0\nbetween =", "coordination.validity_s"),
+            ("switching = { gain = 0.1 }", "solution1 = { a = 1.0 }", "coordination.talk"),
+            (
+                "switching = { gain = 0.1 }",
+                "known_delay = { gain = 0.1, longest_s = 1e6 }",
+                "coordination.law.known_delay",
+            ),
+        ] {
+            let found = faults(&text.replacen(old, new, 1));
+            assert!(found.iter().any(|line| line.contains(&format!(": {key}"))), "{new:?}: {found:?}");
+        }
+        let found = faults(&text.replace("most_silence_s = 30.0", "").replace("patience_s = 1.5", ""));
+        assert!(found.iter().any(|line| line.contains("silent for ever")), "{found:?}");
     }
 
     #[test]
