@@ -16,6 +16,7 @@ mod positive;
 pub mod random;
 pub mod record;
 pub mod riccati;
+pub mod talk;
 pub mod theory;
 pub mod time;
 pub mod vehicle;

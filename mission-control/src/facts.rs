@@ -20,7 +20,7 @@ pub fn facts(mission: &Mission) -> Facts {
         description: mission.about.clone(),
         vehicles: (0..mission.vehicles.len()).map(|i| vehicle(mission, file.as_ref(), i)).collect(),
         links: mission.links.iter().map(|link| (name(link.from), name(link.to))).collect(),
-        message_bytes: mission.message_bytes() as u64,
+        message_bytes: (0..mission.vehicles.len()).map(|i| mission.message_bytes(i) as u64).max().unwrap_or(0),
         duration_s: mission.end.secs(),
         control_period_s: mission.control_period.secs(),
         link_period_s: file.as_ref().and_then(|file| match &file.network.switching {
@@ -30,9 +30,9 @@ pub fn facts(mission: &Mission) -> Facts {
         }),
         guaranteed_rate: guarantee.map(|g| g.rate),
         guaranteed_factor: guarantee.and_then(|g| g.factor),
-        predicted_speed: Some(
-            mission.excited_speed().unwrap_or(mission.nominal_factor() * mission.speed.at(mission.end).v_l),
-        ),
+        predicted_speed: mission
+            .excited_speed()
+            .or_else(|| Some(theory::speed_factor(mission)? * mission.speed.at(mission.end).v_l)),
         predicted_along_bias_m: mission.predicted_along_bias(0),
         symbol: if is_chapter_4(mission) { "γ".to_string() } else { "ξ".to_string() },
         xi_unit: String::new(),
@@ -48,6 +48,8 @@ fn is_chapter_4(mission: &Mission) -> bool {
             | LawChoice::DelayedWithLosses(_)
             | LawChoice::Auxiliary(_)
             | LawChoice::AuxiliarySwitching(_)
+            | LawChoice::DelayedEstimating(_)
+            | LawChoice::KnownDelay(_)
     )
 }
 
@@ -67,5 +69,11 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         PathChoice::Spline(_) => "spline",
         PathChoice::Geojson(_) => "waypoints",
     });
-    VehicleFacts { id: plan.id.clone(), pattern: plan.pattern, path: path.to_string(), planned }
+    VehicleFacts {
+        id: plan.id.clone(),
+        pattern: plan.pattern,
+        path: path.to_string(),
+        planned,
+        message_bytes: Some(mission.message_bytes(index) as u64),
+    }
 }

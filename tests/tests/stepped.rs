@@ -138,6 +138,15 @@ fn the_network_of_a_run_can_be_flown_again() {
 }
 
 #[test]
+fn vehicles_that_speak_by_event_step_as_they_simulate() {
+    let ground = Ground::new();
+    let mission = in_repository("missions/talk/event-triggered.toml");
+    simulate(&ground, &mission, "simulated");
+    step(&ground, &mission, "stepped");
+    assert_equal_runs(&ground, "simulated", "stepped");
+}
+
+#[test]
 fn the_same_seed_repeats_a_run_and_another_does_not() {
     let ground = Ground::new();
     let mission = in_repository(ROUGH);

@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use common::coordination::VehicleLaw;
+use common::coordination::{Own, VehicleLaw};
 use common::craft::Craft;
 use common::machine::Machine;
 use common::mission::{Mission, SpeedProfile, Start};
 use common::record::{ClockRecord, Name, NoteRow, Record, Row, StateRow, TicksRow};
+use common::talk::speaker::Speaker;
 use common::time::Time;
 use common::vehicle::environment::{Conditions, Environment};
 use common::wire::Garbage;
@@ -51,6 +52,7 @@ pub struct Flight {
     environment: Option<Environment>,
     law: Box<dyn VehicleLaw>,
     neighbours: Neighbours,
+    speaker: Speaker,
     speed: SpeedProfile,
     /// The next control period to run, and the last one run.
     next: i64,
@@ -116,6 +118,7 @@ impl Flight {
             environment: mission.environment(me),
             law: mission.law.vehicle(me),
             neighbours: Neighbours::new(&mission, me),
+            speaker: Speaker::new(&mission, me),
             speed: mission.speed.clone(),
             next: (now.nanos() + period - 1).div_euclid(period).max(0),
             last: None,
@@ -223,6 +226,8 @@ impl Flight {
             // What the law has gathered meanwhile was about another place.
             self.law = self.mission.law.vehicle(self.me);
             self.rejoining = false;
+            // The place where it was before is not a past of this place.
+            self.law = self.mission.law.vehicle(self.me);
         }
         let mut own = self.craft.own(reference);
         own.xi -= pattern.h;
@@ -237,17 +242,7 @@ impl Flight {
         let number = tick / self.mission.message_ticks;
         if number >= self.next_message {
             self.next_message = number + 1;
-            let state = CoordinationState {
-                mission: self.mission.digest,
-                sender: self.me as u16,
-                seq: number as u32,
-                made: t,
-                xi: own.xi,
-                scalar: self.law.says(&own),
-            };
-            if state.xi.is_finite() && state.scalar.is_none_or(f64::is_finite) {
-                self.outputs.push_back(FlightOutput::Transmit(state.encode()));
-            } else {
+            if self.speaker.wants(t, own.xi, reference.v_l) && !self.speak(t, number, &own, reference.v_l) {
                 self.fail(t, "the coordination state is not a number");
                 return;
             }
@@ -264,6 +259,24 @@ impl Flight {
             }
             self.outputs.push_back(FlightOutput::Record(Row::Exact(Record::State(row))));
         }
+    }
+
+    /// Puts the coordination state on the air; false if it is not a number.
+    fn speak(&mut self, t: Time, number: i64, own: &Own, v_l: f64) -> bool {
+        let state = CoordinationState {
+            mission: self.mission.digest,
+            sender: self.me as u16,
+            seq: number as u32,
+            made: t,
+            xi: own.xi,
+            scalar: self.law.says(own),
+        };
+        let sound = state.xi.is_finite() && state.scalar.is_none_or(f64::is_finite);
+        if sound {
+            let word = self.speaker.say(state, v_l);
+            self.outputs.push_back(FlightOutput::Transmit(word.encode()));
+        }
+        sound
     }
 
     fn state_row(&self, t: Time, neighbours: u16) -> StateRow {
@@ -363,12 +376,14 @@ impl Machine for Flight {
             _ if self.over => {}
             None => self.tick(now),
             Some(FlightInput::Heard(bytes)) => {
-                // Old news is normal (duplicates, overtaking); anything else deserves one line.
-                if let Err(kind) = self.neighbours.hear(now, &bytes)
-                    && kind != Garbage::Stale
-                    && self.neighbours.garbage.of(kind) == 1
-                {
-                    self.note(now, format!("first message ignored that is {}", kind.as_str()), 1);
+                match self.neighbours.hear(now, &bytes) {
+                    Ok(word) => self.speaker.hear(&word),
+                    // Old news is normal (duplicates, overtaking); anything else deserves one line.
+                    Err(Garbage::Stale) => {}
+                    Err(kind) if self.neighbours.garbage.of(kind) == 1 => {
+                        self.note(now, format!("first message ignored that is {}", kind.as_str()), 1);
+                    }
+                    Err(_) => {}
                 }
             }
             Some(FlightInput::Speed(command)) => self.speed.command(command),

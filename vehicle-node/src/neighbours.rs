@@ -2,9 +2,9 @@
 
 use common::coordination::Neighbour;
 use common::mission::Mission;
-use common::mission::file::Between;
+use common::talk::belief::{Belief, Model};
 use common::time::{Span, Time};
-use common::wire::state::CoordinationState;
+use common::wire::state::{CoordinationState, Word};
 use common::wire::{Garbage, GarbageCount};
 
 /// How far the clocks of two hosts may be apart before a message counts as made in the future.
@@ -17,11 +17,7 @@ pub struct Neighbours {
     me: usize,
     mission: u64,
     validity: Option<Span>,
-    between: Between,
-    /// Delay the law was told \[s\].
-    law_delay: f64,
-    /// v_L* / v_L.
-    nominal_factor: f64,
+    model: Model,
     /// Per sender, what was heard last.
     heard: Vec<Option<Heard>>,
     /// Whether this vehicle listens to that sender.
@@ -37,6 +33,7 @@ struct Heard {
     state: CoordinationState,
     /// When it arrived: silence is counted from here, for the delay is not known to the vehicle.
     arrived: Time,
+    belief: Belief,
 }
 
 impl Neighbours {
@@ -51,9 +48,7 @@ impl Neighbours {
             me,
             mission: mission.digest,
             validity: mission.validity,
-            between: mission.between,
-            law_delay: mission.law_delay().unwrap_or(0.0),
-            nominal_factor: mission.nominal_factor(),
+            model: mission.belief(),
             heard: vec![None; n],
             listens,
             garbage: GarbageCount::default(),
@@ -65,7 +60,7 @@ impl Neighbours {
     ///
     /// # Errors
     /// The kind of garbage they are.
-    pub fn hear(&mut self, now: Time, bytes: &[u8]) -> Result<(), Garbage> {
+    pub fn hear(&mut self, now: Time, bytes: &[u8]) -> Result<Word, Garbage> {
         let result = self.take(now, bytes);
         if let Err(kind) = result {
             self.garbage.count(kind);
@@ -73,8 +68,9 @@ impl Neighbours {
         result
     }
 
-    fn take(&mut self, now: Time, bytes: &[u8]) -> Result<(), Garbage> {
-        let state = CoordinationState::decode(bytes)?;
+    fn take(&mut self, now: Time, bytes: &[u8]) -> Result<Word, Garbage> {
+        let word = Word::decode(bytes)?;
+        let state = word.state;
         if state.mission != self.mission {
             return Err(Garbage::WrongMission);
         }
@@ -89,8 +85,10 @@ impl Neighbours {
         if slot.is_some_and(|heard| (heard.state.made, heard.state.seq) >= (state.made, state.seq)) {
             return Err(Garbage::Stale);
         }
-        *slot = Some(Heard { state, arrived: now });
-        Ok(())
+        let mut belief = slot.map_or_else(Belief::default, |heard| heard.belief);
+        belief.hear(state.made, state.xi);
+        *slot = Some(Heard { state, arrived: now, belief });
+        Ok(word)
     }
 
     /// N_i at this instant, with what stands for each neighbour's state. `rate` is that at which a neighbour is taken to
@@ -104,11 +102,7 @@ impl Neighbours {
             }
             let age = (now - heard.state.made).secs();
             let scalar = heard.state.scalar.unwrap_or(0.0);
-            let xi = match self.between {
-                Between::Hold => heard.state.xi,
-                Between::Advance => heard.state.xi + rate(scalar) * age,
-                Between::Align => heard.state.xi + self.nominal_factor * rate(scalar) * (age - self.law_delay),
-            };
+            let Some(xi) = heard.belief.for_law(&self.model, now, rate(scalar)) else { continue };
             self.present.push(Neighbour { vehicle, xi, scalar, said: heard.state.xi, age });
         }
         &self.present
@@ -119,7 +113,7 @@ impl Neighbours {
     pub fn formation_xi(&self, now: Time, rate: impl Fn(f64) -> f64) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0u32);
         for heard in self.heard.iter().flatten() {
-            let rate = self.nominal_factor * rate(heard.state.scalar.unwrap_or(0.0));
+            let rate = self.model.nominal_factor * rate(heard.state.scalar.unwrap_or(0.0));
             sum += heard.state.xi + rate * (now - heard.state.made).secs();
             count += 1;
         }

@@ -24,6 +24,8 @@
 //! | delay, at times alone | Lemma 4.5 | (4.34), and v_L* when N_i is empty (4.42) | rate | γ_j | [`delayed_4_42`] |
 //! | auxiliary state, fixed network | Theorem 4.8 | γ̇ = v_L + z − A₁⁻¹(Lγ + α_2) (4.59)–(4.61) | rate | γ_j | [`auxiliary_4_59`] |
 //! | auxiliary state, switching network | Theorem 4.9 | the same with α_2 ≡ 0 (4.62) | rate | γ_j | [`auxiliary_4_59`] |
+//! | delay, not told | this project; after Lemma 4.5 | (4.42) with v_L* estimated on board | rate | γ_j | [`delayed_4_42_estimating`] |
+//! | delay, known | this project | v_r = v_L − kΣ(γ_i(t−τ_ij) − γ_j(t−τ_ij)) | rate | γ_j and its age | [`known_delay`] |
 //!
 //! What all of them need of the neighbours is in [`disagreement`], what the laws of chapter 2 share in [`recruiting`].
 
@@ -31,10 +33,12 @@ pub mod auxiliary_4_59;
 pub mod decentralised_3_92;
 pub mod delayed_4_34;
 pub mod delayed_4_42;
+pub mod delayed_4_42_estimating;
 pub mod directed_3_72;
 pub mod disagreement;
 pub mod gateway_2_33;
 pub mod introduction_1_5;
+pub mod known_delay;
 pub mod leader_1_5;
 pub mod leader_follower_2_30;
 pub mod neighbours_2_7;

@@ -27,8 +27,12 @@ use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::network::Medium;
 use crate::path::Path;
+use crate::talk::belief::Model;
+use crate::talk::speaker::acknowledgements;
+use crate::talk::trigger::Trigger;
 use crate::time::{Span, Time};
 use crate::vehicle::environment::{Disturbances, Environment};
+use crate::wire::state::{Acknowledgement, CoordinationState, Word};
 
 /// A mission that can be flown: every number is in its range and everything fits together.
 #[derive(Clone, Debug)]
@@ -63,6 +67,8 @@ pub struct Mission {
     pub validity: Option<Span>,
     /// What stands for a neighbour's state between its messages.
     pub between: file::Between,
+    /// When vehicles speak; in every message period without a trigger.
+    pub talk: Option<Trigger>,
     /// The vehicles, in the order of the file.
     pub vehicles: Vec<VehiclePlan>,
     /// The directed links, in the order of the file, both directions of a link side by side.
@@ -211,11 +217,27 @@ impl Mission {
         Ok(())
     }
 
-    /// Size of one coordination message \[bytes\].
-    pub fn message_bytes(&self) -> usize {
-        let scalar = self.law.says().map(|_| 0.0);
-        let (mission, sender, seq, made, xi) = (self.digest, 0, 0, Time::ZERO, 0.0);
-        crate::wire::state::CoordinationState { mission, sender, seq, made, xi, scalar }.encode().len()
+    /// What stands for a vehicle's state between its messages.
+    pub fn belief(&self) -> Model {
+        let law_delay = self.law_delay().unwrap_or(0.0);
+        Model { between: self.between, nominal_factor: self.nominal_factor(), law_delay }
+    }
+
+    /// Size of one coordination message of a vehicle \[bytes\].
+    pub fn message_bytes(&self, vehicle: usize) -> usize {
+        let state = CoordinationState {
+            mission: self.digest,
+            sender: 0,
+            seq: 0,
+            made: Time::ZERO,
+            xi: 0.0,
+            scalar: self.law.says().map(|_| 0.0),
+        };
+        let mut word = Word::from(state);
+        for _ in 0..acknowledgements(self, vehicle) {
+            word.acknowledge(Acknowledgement::default());
+        }
+        word.encode().len()
     }
 
     /// What surrounds a vehicle during its flight; `None` where nothing disturbs it.

@@ -13,7 +13,7 @@ pub struct Facts {
     pub vehicles: Vec<VehicleFacts>,
     /// The directed links (from, to) of the network.
     pub links: Vec<(String, String)>,
-    /// Size of one message on the air \[bytes\].
+    /// Size of one message on the air, of vehicles that have no size of their own \[bytes\].
     pub message_bytes: u64,
     /// Length of the mission \[s\].
     pub duration_s: f64,
@@ -48,9 +48,17 @@ pub struct VehicleFacts {
     pub path: String,
     /// The path as planned \[m\], for the figures; may be empty.
     pub planned: Vec<[f64; 3]>,
+    /// Size of one of its messages \[bytes\], if not the fleet's.
+    pub message_bytes: Option<u64>,
 }
 
 impl Facts {
+    /// Size of one message of this vehicle \[bytes\].
+    pub(super) fn bytes_of(&self, id: &str) -> u64 {
+        let own = self.vehicles.iter().find(|vehicle| vehicle.id == id).and_then(|vehicle| vehicle.message_bytes);
+        own.unwrap_or(self.message_bytes)
+    }
+
     /// The symbol of the coordination state.
     pub(crate) fn symbol(&self) -> &str {
         if self.symbol.is_empty() { "ξ" } else { &self.symbol }

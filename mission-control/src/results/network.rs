@@ -90,7 +90,7 @@ pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<L
     let all = named.into_iter().chain(others);
     all.map(|(from, to)| {
         let rows = messages.get(&(from, to)).map_or(&[][..], Vec::as_slice);
-        let summary = ledger(rows, facts.message_bytes);
+        let summary = ledger(rows, facts.bytes_of(from));
         let down = network.down_times(from, to);
         let duration = network.end_s - network.start_s;
         let down_s: f64 = down.iter().map(|(from, to)| to - from).sum();
@@ -148,8 +148,8 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
     LinkSummary { balanced: summary.sent == accounted && missing == 0 && repeated == 0, ..summary }
 }
 
-/// Number of transmissions: a message to several receivers goes on the air once.
-pub(super) fn transmissions(exact: &[Record]) -> u64 {
+/// Number of transmissions by sender: a message to several receivers goes on the air once.
+pub(super) fn transmissions(exact: &[Record]) -> BTreeMap<&str, u64> {
     let mut sent: Vec<(&str, i64, u64)> = exact
         .iter()
         .filter_map(|record| match record {
@@ -159,7 +159,9 @@ pub(super) fn transmissions(exact: &[Record]) -> u64 {
         .collect();
     sent.sort_unstable();
     sent.dedup();
-    sent.len() as u64
+    let mut by_sender = BTreeMap::new();
+    sent.iter().for_each(|(from, ..)| *by_sender.entry(*from).or_default() += 1);
+    by_sender
 }
 
 /// The links over time.
@@ -390,7 +392,7 @@ mod tests {
         assert!(link.balanced);
         assert_eq!((link.sent, link.delivered, link.delivered_bytes), (6, 2, 20));
         assert_eq!(link.delay, Some(Spread { median: 5.0, p99: 5.0, max: 5.0 }));
-        assert_eq!(transmissions(&rows), 6);
+        assert_eq!(transmissions(&rows).values().sum::<u64>(), 6);
     }
 
     #[test]

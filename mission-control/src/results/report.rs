@@ -284,7 +284,7 @@ fn network(page: &mut String, report: &Report<'_>) {
     });
     table(page, "numbers", &header, links.iter().map(row).chain(sum));
     let mut sentences = vec![format!(
-        "{} transmissions of {} bytes: {} bytes on the air.",
+        "{} transmissions of at most {} bytes: {} bytes on the air.",
         totals.transmissions, totals.message_bytes, totals.bytes_on_air
     )];
     if let Some(connectivity) = report.summary.fleet.connectivity {

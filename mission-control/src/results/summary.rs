@@ -1,5 +1,7 @@
 //! The numbers of a run: `summary.json`, a function of mission and seed, and `clock.json`, of the machine too.
 
+use std::collections::BTreeMap;
+
 use bus::recording::Recording;
 use common::record::{ClockRecord, Record, StateRow};
 use common::time::Time;
@@ -134,9 +136,9 @@ pub struct MessageTotals {
     pub copy_in_flight: u64,
     /// Transmissions: a message to several receivers goes on the air once.
     pub transmissions: u64,
-    /// Size of one message \[bytes\].
+    /// Size of one message; of the largest, where they differ \[bytes\].
     pub message_bytes: u64,
-    /// Transmissions times size.
+    /// Transmissions, each times its size.
     pub bytes_on_air: u64,
     /// Whether the ledger of every link is balanced.
     pub balanced: bool,
@@ -185,6 +187,10 @@ pub struct VehicleSummary {
     pub heading_rms_rad: f64,
     /// Part of the rows in which it had no neighbour.
     pub alone_fraction: f64,
+    /// Messages that it put on the air, each once, however many hear it.
+    pub messages_said: u64,
+    /// Their size \[bytes\].
+    pub bytes_on_air: u64,
 }
 
 /// Everything that depends on the wall clock and the machine.
@@ -244,7 +250,8 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
     let coordination = Coordination::of(&tracks, facts);
     let network = Network::of(exact, facts);
     let links = links(exact, facts, &network);
-    let vehicles: Vec<VehicleSummary> = tracks.iter().map(|track| vehicle(track, &tracks, facts)).collect();
+    let said = transmissions(exact);
+    let vehicles: Vec<VehicleSummary> = tracks.iter().map(|track| vehicle(track, &tracks, facts, &said)).collect();
     let present = || vehicles.iter().filter(|vehicle| vehicle.rows > 0);
     let fleet = FleetSummary {
         steady_speed: mean(present().map(|vehicle| vehicle.steady_speed)),
@@ -252,7 +259,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         formation_speed: speeds(exact).last().map(|row| row.speed),
         path_error_final_m: largest(present().map(|vehicle| vehicle.path_error_final_m)),
         on_path_s: present().map(|vehicle| vehicle.on_path_s).collect::<Option<Vec<f64>>>().map(largest),
-        messages: totals(&links, transmissions(exact), facts.message_bytes),
+        messages: totals(&links, &said, facts),
         connectivity: network.connectivity(facts),
         coordination: coordination_summary(&coordination, facts),
     };
@@ -336,7 +343,7 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts) -> Coordinat
     }
 }
 
-fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts) -> VehicleSummary {
+fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts, said: &BTreeMap<&str, u64>) -> VehicleSummary {
     let rows = &track.rows;
     let t_s: Vec<f64> = rows.iter().map(|row| row.t_ns as f64 / 1e9).collect();
     let errors: Vec<f64> = rows.iter().map(|row| row.e_norm_m).collect();
@@ -348,6 +355,7 @@ fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts) -> VehicleSummar
     let h = |track: &Track<'_>, row: &StateRow| track.pattern.at(Time::from_nanos(row.t_ns)).h;
     let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - h(track, row));
     let first = all.iter().find_map(removed);
+    let messages_said = said.get(track.id).copied().unwrap_or(0);
     let planned = facts.vehicles.iter().find(|vehicle| vehicle.id == track.id);
     VehicleSummary {
         id: track.id.to_owned(),
@@ -376,6 +384,8 @@ fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts) -> VehicleSummar
         cross_rms_m: rms(steady.iter().map(|row| row.e_cross_m)),
         heading_rms_rad: rms(steady.iter().map(|row| row.psi_e_rad)),
         alone_fraction: mean(rows.iter().map(|row| f64::from(u8::from(row.neighbours == 0)))),
+        messages_said,
+        bytes_on_air: messages_said * facts.bytes_of(track.id),
     }
 }
 
@@ -386,7 +396,7 @@ fn steady_part(t_s: &[f64], facts: &Facts) -> usize {
     t_s.partition_point(|time| *time < from - 1e-9)
 }
 
-fn totals(links: &[LinkSummary], transmissions: u64, message_bytes: u64) -> MessageTotals {
+fn totals(links: &[LinkSummary], said: &BTreeMap<&str, u64>, facts: &Facts) -> MessageTotals {
     let sum = |value: fn(&LinkSummary) -> u64| links.iter().map(value).sum();
     MessageTotals {
         sent: sum(|link| link.sent),
@@ -402,9 +412,9 @@ fn totals(links: &[LinkSummary], transmissions: u64, message_bytes: u64) -> Mess
         copied: sum(|link| link.copied),
         copy_dropped: sum(|link| link.copy_dropped),
         copy_in_flight: sum(|link| link.copy_in_flight),
-        transmissions,
-        message_bytes,
-        bytes_on_air: transmissions * message_bytes,
+        transmissions: said.values().sum(),
+        message_bytes: facts.message_bytes,
+        bytes_on_air: said.iter().map(|(id, said)| said * facts.bytes_of(id)).sum(),
         balanced: links.iter().all(|link| link.balanced),
     }
 }
@@ -482,7 +492,8 @@ mod tests {
         assert_eq!(totals.sent, 4 * 801);
         // v2 speaks to both neighbours at once.
         assert_eq!(totals.transmissions, 3 * 801);
-        assert_eq!(totals.bytes_on_air, 3 * 801 * 40);
+        assert_eq!(totals.bytes_on_air, 801 * (40 + 40 + 44));
+        assert_eq!((vehicle.messages_said, vehicle.bytes_on_air), (801, 801 * 44));
         assert!((summary.links[0].up_fraction - 0.25).abs() < 1e-9);
         assert!((summary.fleet.connectivity.expect("three vehicles").alpha - 0.75).abs() < 1e-9);
     }

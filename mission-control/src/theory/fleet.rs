@@ -5,6 +5,7 @@ use common::time::Span;
 
 use super::Case;
 use super::delayed::told_truly;
+use super::talk::speed_factor;
 use crate::results::TheoryRow;
 
 pub(super) fn graph(case: &Case<'_>) -> TheoryRow {
@@ -109,7 +110,9 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
         condition,
         value,
         holds: mission.law_delay().map(|tau| told_truly(mission, tau)),
-        predicted: format!("{:.5} 1/s", excited.unwrap_or(mission.nominal_factor() * v_l)),
+        predicted: excited
+            .or_else(|| Some(speed_factor(mission)? * v_l))
+            .map_or("–".into(), |speed| format!("{speed:.5} 1/s")),
         measured: case.measured(|s| format!("{:.5} 1/s", s.fleet.steady_speed)),
         ..TheoryRow::default()
     }

@@ -30,6 +30,7 @@ mod learned_speeds;
 mod network;
 mod solutions;
 mod switching;
+mod talk;
 mod watched;
 mod weights_and_patterns;
 
@@ -39,6 +40,7 @@ use common::theory::Verdict;
 use common::theory::linear_coordination::Law;
 
 pub use figures::figures;
+pub use talk::speed_factor;
 pub use watched::so_far;
 
 use crate::results::{Summary, TheoryRow};
@@ -116,6 +118,7 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
         rows.push(fleet::losses(&case));
         rows.push(fleet::connected_in_mean(&case));
         rows.extend(law_rows(&case));
+        rows.extend(talk::row_of_events(&case));
     }
     rows.push(fleet::speed(&case));
     rows.extend(fleet::bias(&case));
@@ -150,6 +153,8 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
         LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
         LawChoice::AuxiliarySwitching(law) => auxiliary::rows_switching(case, law),
         LawChoice::Switching(law) => switching::rows(case, law),
+        LawChoice::DelayedEstimating(_) => talk::rows_of_estimating(case),
+        LawChoice::KnownDelay(law) => talk::rows_of_known_delay(case, law),
         LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),
     }
 }

@@ -18,7 +18,7 @@ pub(super) struct Network {
     pub(super) graphs: Vec<Graph>,
     /// Share of the time that each directed link is up.
     pub(super) up: Vec<f64>,
-    /// Without delay and loss, so that what is said is heard at once.
+    /// Without delay and loss, and all is said that there is, so that it is heard at once.
     pub(super) immediate: bool,
 }
 
@@ -50,7 +50,9 @@ impl Network {
             planned: Connectivity::planned(mission.switching.clone(), n, &arcs, mission.end),
             graphs,
             up,
-            immediate: mission.every_message_takes(Span::ZERO) && mission.loses_by_switching_only(),
+            immediate: mission.talk.is_none()
+                && mission.every_message_takes(Span::ZERO)
+                && mission.loses_by_switching_only(),
         }
     }
 

@@ -8,9 +8,11 @@ use crate::coordination::auxiliary_4_59::Auxiliary;
 use crate::coordination::decentralised_3_92::{Decentralised, Weighing};
 use crate::coordination::delayed_4_34::Delayed;
 use crate::coordination::delayed_4_42::DelayedAlone;
+use crate::coordination::delayed_4_42_estimating::Estimating;
 use crate::coordination::directed_3_72::Directed;
 use crate::coordination::gateway_2_33::Gateway;
 use crate::coordination::introduction_1_5::Introduction;
+use crate::coordination::known_delay::KnownDelay;
 use crate::coordination::leader_1_5::LeaderIntegral;
 use crate::coordination::leader_follower_2_30::LeaderFollower;
 use crate::coordination::neighbours_2_7::Neighbours;
@@ -66,6 +68,8 @@ pub(in crate::mission) fn law(choice: &LawChoice, ids: &[&str]) -> Result<Arc<dy
         LawChoice::DelayedWithLosses(g) => Arc::new(DelayedAlone::new(g.gain, g.delay_s)?),
         LawChoice::Auxiliary(g) => Arc::new(Auxiliary::fixed(g.a1, g.a2)?),
         LawChoice::AuxiliarySwitching(g) => Arc::new(Auxiliary::switching(g.a1, g.a2)?),
+        LawChoice::DelayedEstimating(g) => Arc::new(Estimating::new(g.gain, g.time_constant_s)?),
+        LawChoice::KnownDelay(g) => Arc::new(KnownDelay::new(g.gain, g.longest_s)?),
     })
 }
 
@@ -102,6 +106,8 @@ pub(in crate::mission) fn law_name(choice: &LawChoice) -> &'static str {
         LawChoice::DelayedWithLosses(_) => "delayed_with_losses",
         LawChoice::Auxiliary(_) => "auxiliary",
         LawChoice::AuxiliarySwitching(_) => "auxiliary_switching",
+        LawChoice::DelayedEstimating(_) => "delayed_estimating",
+        LawChoice::KnownDelay(_) => "known_delay",
     }
 }
 

@@ -9,6 +9,7 @@ use super::super::fault::Collector;
 use super::super::file::{Between, LawChoice, MissionFile};
 use super::resolve;
 use crate::coordination::FleetLaw;
+use crate::coordination::known_delay::MOST_REMEMBERED;
 use crate::graph::Graph;
 
 pub(super) fn check_law(
@@ -26,12 +27,18 @@ pub(super) fn check_law(
     if file.coordination.between == Between::Align
         && !matches!(choice, LawChoice::Delayed(_) | LawChoice::DelayedWithLosses(_))
     {
-        let allowed = "hold or advance; align needs a law that is told the delay (delayed, delayed_with_losses)";
+        let allowed =
+            "hold, advance or estimate; align needs a law that is told the delay (delayed, delayed_with_losses)";
         faults.fault("coordination.between", "align", allowed);
     }
     if let LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) = choice {
         let ok = (0.0..=3600.0).contains(&law.delay_s);
         faults.number(&format!("{key}.{name}.delay_s"), law.delay_s, ok, "0 to 3600 s");
+    }
+    if let LawChoice::KnownDelay(law) = choice {
+        let most = MOST_REMEMBERED as f64 * file.clock.control_period_s;
+        let allowed = format!("above 0 and at most {MOST_REMEMBERED} control periods, {most} s");
+        faults.number("coordination.law.known_delay.longest_s", law.longest_s, law.longest_s <= most, &allowed);
     }
     if !names_are_vehicles(faults, choice, ids) {
         return None;

@@ -3,6 +3,7 @@
 mod coordination;
 mod environment;
 mod network;
+mod talk;
 mod time;
 mod vehicle;
 
@@ -10,6 +11,7 @@ use std::collections::HashMap;
 
 use self::coordination::{check_law, check_partners, check_told, check_weights};
 use self::network::{check_links, check_medium, check_switching, with_preset};
+use self::talk::check_talk;
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
 use super::build;
@@ -44,6 +46,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let speed = check_formation(faults, file);
     let ids = check_ids(faults, &file.vehicles);
     let law = check_law(faults, file, &ids);
+    let talk = check_talk(faults, file, law.as_deref());
     let network = with_preset(&file.network);
     let links = check_links(faults, file, &network, &ids);
     check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
@@ -74,6 +77,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         law_choice: file.coordination.law.clone(),
         validity: file.coordination.validity_s.map(Span::from_secs),
         between: file.coordination.between,
+        talk,
         vehicles: vehicles.into_iter().collect::<Option<Vec<_>>>()?,
         links,
         switching,
@@ -169,6 +173,10 @@ mod tests {
             ("waypoints", include_str!("../../../../missions/waypoints.toml")),
             ("fig-3-9", include_str!("../../../../missions/thesis/fig-3-9.toml")),
             ("fig-4-2", include_str!("../../../../missions/thesis/fig-4-2.toml")),
+            ("event-triggered", include_str!("../../../../missions/talk/event-triggered.toml")),
+            ("naive", include_str!("../../../../missions/talk/naive.toml")),
+            ("known-delay", include_str!("../../../../missions/talk/known-delay.toml")),
+            ("estimated-speed", include_str!("../../../../missions/talk/estimated-speed.toml")),
         ] {
             let mission = Mission::parse(name, text).unwrap_or_else(|faults| panic!("{faults}"));
             assert_eq!(mission.name, name);
@@ -232,6 +240,29 @@ mod tests {
             let found = faults_with(old, new);
             assert!(found.iter().any(|line| line.contains(&format!(": {key}"))), "{new:?}: {found:?}");
         }
+    }
+
+    #[test]
+    fn event_triggers_that_make_no_sense_are_refused() {
+        let text = include_str!("../../../../missions/talk/event-triggered.toml");
+        for (old, new, key) in [
+            ("threshold = 0.02", "threshold = 0.0", "coordination.talk.event_triggered"),
+            ("jitter = 0.5", "jitter = 1.0", "coordination.talk.event_triggered"),
+            ("patience_s = 1.5", "patience_s = -1.5", "coordination.talk.event_triggered.patience_s"),
+            ("most_silence_s = 30.0", "most_silence = 30.0", "coordination.talk.event_triggered.most_silence"),
+            ("between =", "validity_s = 30.0\nbetween =", "coordination.validity_s"),
+            ("switching = { gain = 0.1 }", "solution1 = { a = 1.0 }", "coordination.talk"),
+            (
+                "switching = { gain = 0.1 }",
+                "known_delay = { gain = 0.1, longest_s = 1e6 }",
+                "coordination.law.known_delay",
+            ),
+        ] {
+            let found = faults(&text.replacen(old, new, 1));
+            assert!(found.iter().any(|line| line.contains(&format!(": {key}"))), "{new:?}: {found:?}");
+        }
+        let found = faults(&text.replace("most_silence_s = 30.0", "").replace("patience_s = 1.5", ""));
+        assert!(found.iter().any(|line| line.contains("silent for ever")), "{found:?}");
     }
 
     #[test]

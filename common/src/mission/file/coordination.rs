@@ -16,6 +16,44 @@ pub struct CoordinationSection {
     /// What stands for a neighbour's state between its messages.
     #[serde(default)]
     pub between: Between,
+    /// When vehicles speak.
+    #[serde(default)]
+    pub talk: Talk,
+}
+
+/// When vehicles speak.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Talk {
+    /// Every vehicle speaks in every message period.
+    #[default]
+    Periodic,
+    /// A vehicle speaks when what the others believe of it has become wrong; looked at once in every message period.
+    EventTriggered(EventTriggered),
+}
+
+/// When a difference is worth a message.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EventTriggered {
+    /// A vehicle speaks when it is further than this from where the others believe it (units of xi).
+    pub threshold: f64,
+    /// How much higher the threshold is at the start (units of xi).
+    #[serde(default)]
+    pub start: f64,
+    /// Rate at which that decays (1/s).
+    #[serde(default)]
+    pub decay_per_s: f64,
+    /// Nothing is said sooner after the last message (s).
+    #[serde(default)]
+    pub least_silence_s: f64,
+    /// Something is said at the latest so long after the last message (s).
+    pub most_silence_s: Option<f64>,
+    /// The part of the longest silence by which it is shortened at random, 0 to below 1.
+    #[serde(default)]
+    pub jitter: f64,
+    /// With it messages acknowledge what was heard, and what is not acknowledged after this long (s) is said again;
+    /// without it, what was said counts as heard.
+    pub patience_s: Option<f64>,
 }
 
 /// What stands for a neighbour's state between its messages.
@@ -28,6 +66,8 @@ pub enum Between {
     /// The last value, advanced from when it was made to now at v_L: a network observer. Vehicles that are not told v_L
     /// advance at what they have learned, or at what the neighbour says.
     Advance,
+    /// The last value, advanced from when it was made to now at the rate of the vehicle's last messages.
+    Estimate,
     /// The last value, advanced from when it was made to now less the law's delay at the speed the fleet travels at:
     /// the sampled γ_j(t − τ) of (4.34) and (4.42).
     Align,
@@ -77,6 +117,10 @@ pub enum LawChoice {
     Auxiliary(Auxiliary),
     /// Auxiliary state, switching network, (4.62).
     AuxiliarySwitching(Auxiliary),
+    /// As the one before, by vehicles that are not told the delay: they estimate v_L*.
+    DelayedEstimating(DelayedEstimating),
+    /// Delayed information compared with one's own past of the same age.
+    KnownDelay(KnownDelay),
 }
 
 /// One gain.
@@ -273,6 +317,29 @@ pub struct Delayed {
     pub gain: f64,
     /// The delay τ the vehicles are told, to compute v_L* = v_L / (1 + k τ) (s).
     pub delay_s: f64,
+}
+
+/// Gain of (4.42) with an estimate of v_L*.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct DelayedEstimating {
+    /// Coordination gain k, divided by the number of neighbours heard (1/s).
+    pub gain: f64,
+    /// Time constant of the estimate, in time with neighbours (s).
+    #[serde(default = "default_time_constant")]
+    pub time_constant_s: f64,
+}
+
+/// Gain of the law that knows how old its news are.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct KnownDelay {
+    /// Coordination gain k (1/s).
+    pub gain: f64,
+    /// How far back a vehicle remembers where it was; older news do not count (s).
+    pub longest_s: f64,
+}
+
+fn default_time_constant() -> f64 {
+    10.0
 }
 
 fn default_message_period() -> f64 {

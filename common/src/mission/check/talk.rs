@@ -1,0 +1,60 @@
+//! When vehicles speak.
+
+use super::super::fault::Collector;
+use super::super::file::{EventTriggered, MissionFile, Talk};
+use crate::coordination::FleetLaw;
+use crate::talk::trigger::{Settings, Trigger};
+use crate::time::Span;
+
+/// The event trigger, if there is one; `None` with a fault noted, or for periodic talk.
+pub(super) fn check_talk(
+    faults: &mut Collector<'_>,
+    file: &MissionFile,
+    law: Option<&dyn FleetLaw>,
+) -> Option<Trigger> {
+    let Talk::EventTriggered(talk) = &file.coordination.talk else { return None };
+    let key = "coordination.talk.event_triggered";
+    if let Some(says) = law.and_then(FleetLaw::says) {
+        let allowed = "periodic, or a law that needs nothing beside xi";
+        faults.fault("coordination.talk", format!("event_triggered with a law that sends its {says}"), allowed);
+    }
+    for (name, span) in [
+        ("least_silence_s", Some(talk.least_silence_s)),
+        ("most_silence_s", talk.most_silence_s),
+        ("patience_s", talk.patience_s),
+    ] {
+        let span = span.unwrap_or(0.0);
+        faults.number(&format!("{key}.{name}"), span, (0.0..=LONGEST_SILENCE_S).contains(&span), "0 to 86400 s");
+    }
+    // Silence is information: a neighbour that is silent because all is as believed must not leave N_i.
+    if let Some(validity) = file.coordination.validity_s {
+        let allowed = match talk.most_silence_s {
+            Some(most) => format!("above most_silence_s, {most} s; leave it out for ever"),
+            None => "none without most_silence_s".to_string(),
+        };
+        let longer = talk.most_silence_s.is_some_and(|most| validity > most);
+        faults.number("coordination.validity_s", validity, longer, &allowed);
+    }
+    match Trigger::new(settings(talk)) {
+        Ok(trigger) => Some(trigger),
+        Err(reason) => {
+            faults.fault(key, reason, "a threshold above 0, and a longest silence or a patience");
+            None
+        }
+    }
+}
+
+/// Longest silence and patience \[s\].
+const LONGEST_SILENCE_S: f64 = 86_400.0;
+
+fn settings(talk: &EventTriggered) -> Settings {
+    Settings {
+        floor: talk.threshold,
+        start: talk.start,
+        decay: talk.decay_per_s,
+        least_silence: Span::from_secs(talk.least_silence_s),
+        most_silence: talk.most_silence_s.map(Span::from_secs),
+        jitter: talk.jitter,
+        patience: talk.patience_s.map(Span::from_secs),
+    }
+}
