@@ -641,7 +641,7 @@ mod tests {
                     })
                     .collect();
                 let [bytes] = &sent[..] else { panic!("{name}: {} messages", sent.len()) };
-                assert_eq!(bytes.len(), mission.message_bytes(), "{name}");
+                assert_eq!(bytes.len(), mission.message_bytes(0), "{name}");
                 assert_eq!(CoordinationState::decode(bytes).expect("sound").scalar.is_some(), scalar, "{name}");
             }
         }
