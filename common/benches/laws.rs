@@ -2,15 +2,18 @@
 //!
 //! The allocations that are counted must be none.
 
+use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
 use std::sync::Arc;
 
 use cpf_common::coordination::auxiliary_4_59::Auxiliary;
 use cpf_common::coordination::decentralised_3_92::{Decentralised, Weighing};
 use cpf_common::coordination::directed_3_72::Directed;
+use cpf_common::coordination::gateway_2_33::Gateway;
 use cpf_common::coordination::introduction_1_5::Introduction;
 use cpf_common::coordination::leader_1_5::LeaderIntegral;
 use cpf_common::coordination::pattern_3_70::MovingPattern;
+use cpf_common::coordination::recruiting::Gains as Recruits;
 use cpf_common::coordination::solution_1_3_43::SolutionOne;
 use cpf_common::coordination::switching_4_21::Switching;
 use cpf_common::coordination::weighted_3_62::Weighted;
@@ -18,8 +21,15 @@ use cpf_common::coordination::{CoordinationLaw, FleetLaw, Neighbour, Own, SpeedR
 use cpf_common::craft::Craft;
 use cpf_common::craft::kinematic::KinematicCraft;
 use cpf_common::craft::robot::{RobotCraft, SpeedLoop};
+use cpf_common::craft::trimming::TrimmingCraft;
+use cpf_common::following::decoupling_2_14::Decoupling;
+use cpf_common::following::h2_figure_2_4::{Controller, Disturbances, design};
 use cpf_common::following::line_of_sight::LineOfSight;
+use cpf_common::following::output_feedback_2_3::OutputFeedback;
 use cpf_common::following::proposition_3_1::{Gains, Proposition31};
+use cpf_common::following::state_transformation_2_19::StateTransformation;
+use cpf_common::following::trimming::{Derivative, Placement, TrimmingLaw};
+use cpf_common::path::circle::{Circle, Turn};
 use cpf_common::path::closest::closest_parameter;
 use cpf_common::path::line::Line;
 use cpf_common::path::sinusoid::Sinusoid;
@@ -37,6 +47,55 @@ const NEIGHBOURS: [Neighbour; 2] = [
 
 fn main() {
     divan::main();
+}
+
+/// One control period of 20 ms of a vehicle whose law has states.
+fn period_of_learner(bencher: divan::Bencher, mut craft: impl Craft, law: &dyn FleetLaw) {
+    let mut law = law.vehicle(0);
+    bencher.bench_local(|| {
+        let own = craft.own(REFERENCE);
+        craft.command(REFERENCE, law.demand(REFERENCE, &own, black_box(&NEIGHBOURS)));
+        craft.advance(0.02, 2);
+        law.advance(0.02);
+        black_box(craft.observe())
+    });
+}
+
+/// A robot of chapter 2 on a circle.
+fn trimming_robot(law: Box<dyn TrimmingLaw>) -> TrimmingCraft {
+    let path = Circle::new(Vector3::zeros(), 2.0, Turn::Left, 0.0, 1.0).expect("a path");
+    let parameters = Parameters { mass: 5.0, inertia: 0.4 };
+    let state = State { x: 2.0, heading: FRAC_PI_2, speed: 0.2, ..State::default() };
+    TrimmingCraft::new(Arc::new(path), law, SpeedLoop::Acceleration, parameters, state, 0.0).expect("a robot")
+}
+
+fn gateway() -> Gateway {
+    Gateway::new(0, 5.0, Recruits { a: 3.0, b: 3.0, c: 1.0 }).expect("gains")
+}
+
+#[divan::bench]
+fn decoupling_with_2_33(bencher: divan::Bencher) {
+    let placement = Placement::new(1.0, 0.05).expect("gains");
+    let law = Decoupling::new(placement, Derivative::Exact).expect("a law");
+    period_of_learner(bencher, trimming_robot(Box::new(law)), &gateway());
+}
+
+#[divan::bench]
+fn output_feedback_with_2_33(bencher: divan::Bencher) {
+    let law = OutputFeedback::new(0.4, 0.5, Disturbances::default(), Derivative::Exact).expect("a law");
+    period_of_learner(bencher, trimming_robot(Box::new(law)), &gateway());
+}
+
+#[divan::bench]
+fn state_transformation_with_2_33(bencher: divan::Bencher) {
+    let law = StateTransformation::new(Placement::new(1.0, 0.05).expect("gains"));
+    period_of_learner(bencher, trimming_robot(Box::new(law)), &gateway());
+}
+
+/// Done once per change of curvature; this one allocates.
+#[divan::bench]
+fn h_2_design() -> Controller {
+    design(black_box(0.5), 0.4, &Disturbances::default()).expect("a controller")
 }
 
 /// One control period of 20 ms.

@@ -4,6 +4,12 @@
 //! |---|---|---|---|---|---|
 //! | two vehicles on lines | section 1.2 | ẋ_i = −a_i (x_i − x_j) + v_L (1.5) | rate | ξ_j | [`introduction_1_5`] |
 //! | two vehicles, one of which learns v_L | section 1.2 | ẋ_2 = −a_2 (x_2 − x_1) + b_2 e_I, after (1.5) | rate | ξ_j | [`leader_1_5`] |
+//! | leader and followers | section 2.2.1 | F_1 = −a_1(v_1 − v_1^c) (2.30), followers (2.31) | forward acceleration | ξ_1 | [`leader_follower_2_30`] |
+//! | gateway | section 2.2.2, erratum 2.2 | (2.33), (2.34) | forward acceleration | ξ_1, or all ξ_i | [`gateway_2_33`] |
+//! | gateway with the extra integrator | section 2.5.3, errata 2.2, 2.12 | (2.33), (2.34) with δe_{1,i} | forward acceleration | the same, δe_{1,i} | [`gateway_2_33`] |
+//! | neighbours in a row | Figure 2.7-3, a law of our own | (2.33) for any vehicle | forward acceleration | ξ_{i±1} | [`neighbours_2_7`] |
+//! | alone | (2.30) for every vehicle | F_i = −a_1(v_i − R_i v_L) | forward acceleration | nothing | [`prescribed_2_6`] |
+//! | square wave | Figure 2.6 | F_i/m = ±amplitude | forward acceleration | nothing | [`prescribed_2_6`] |
 //! | solution I | Proposition 3.4 | u = −(LC + C + A)η − ALξ (3.43) | acceleration | ξ_j, η_j/R_j | [`solution_1_3_43`] |
 //! | solution II | Proposition 3.4 | u = −Aη − BCLξ (3.44) | acceleration | ξ_j | [`solution_2_3_44`] |
 //! | solution III | Proposition 3.5 | u = −(A⁻¹L + A)Cη − B sat(η + A⁻¹Lξ) (3.45) | acceleration | ξ_j, η_j/R_j | [`solution_3_3_45`] |
@@ -19,7 +25,7 @@
 //! | auxiliary state, fixed network | Theorem 4.8 | γ̇ = v_L + z − A₁⁻¹(Lγ + α_2) (4.59)–(4.61) | rate | γ_j | [`auxiliary_4_59`] |
 //! | auxiliary state, switching network | Theorem 4.9 | the same with α_2 ≡ 0 (4.62) | rate | γ_j | [`auxiliary_4_59`] |
 //!
-//! What all of them need of the neighbours is in [`disagreement`].
+//! What all of them need of the neighbours is in [`disagreement`], what the laws of chapter 2 share in [`recruiting`].
 
 pub mod auxiliary_4_59;
 pub mod decentralised_3_92;
@@ -27,9 +33,14 @@ pub mod delayed_4_34;
 pub mod delayed_4_42;
 pub mod directed_3_72;
 pub mod disagreement;
+pub mod gateway_2_33;
 pub mod introduction_1_5;
 pub mod leader_1_5;
+pub mod leader_follower_2_30;
+pub mod neighbours_2_7;
 pub mod pattern_3_70;
+pub mod prescribed_2_6;
+pub mod recruiting;
 pub mod solution_1_3_43;
 pub mod solution_2_3_44;
 pub mod solution_3_3_45;

@@ -4,6 +4,7 @@
 //! | craft | plant | path-following law | takes | file |
 //! |---|---|---|---|---|
 //! | kinematic | kinematic unicycle | line of sight (1.4) | rate | [`kinematic`] |
+//! | trimming robot | dynamic unicycle (2.1), (2.2) | chapter 2, against its own foot on the path | acceleration, or rate | [`trimming`] |
 //! | robot | dynamic unicycle (3.12) | Proposition 3.1 or 3.2 | acceleration (3.39), or rate (4.21) | [`robot`] |
 //! | marine | fully actuated vehicle (3.28) | Proposition 3.3 | acceleration (3.39), or rate (4.21) | [`marine`] |
 //! | underactuated body in space | 6-DOF (4.44), (4.45) | Theorem 4.7 | rate | [`auv`] |
@@ -12,6 +13,7 @@ pub mod auv;
 pub mod kinematic;
 pub mod marine;
 pub mod robot;
+pub mod trimming;
 
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::vehicle::environment::Conditions;
@@ -64,6 +66,9 @@ pub const SINGULAR: &str = "too slow to have a side-slip, the wanted one was tak
 fn limited(effort: f64, limit: f64) -> (f64, bool) {
     if effort.abs() > limit { (limit.copysign(effort), true) } else { (effort, false) }
 }
+
+/// The vehicle was at or beyond its path's centre of curvature, where the closest point is not unique.
+pub const AT_CENTRE: &str = "at the path's centre of curvature, where the closest point jumps";
 
 /// Most actuators have one: the largest effort that they give, either way.
 #[derive(Clone, Copy, Debug, PartialEq)]

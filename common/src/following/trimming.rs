@@ -8,11 +8,8 @@
 //! ṙ = N/I,    ḋ_e = v ψ_e,    ψ̇_e = r − c_c² v d_e
 //! ```
 
+use crate::path::foot::LEAST_NEARNESS;
 use crate::positive::positive;
-
-/// Least 1 − d_e c_c that a law reckons with: (2.9) holds only where it is positive, that is, on the vehicle's side of the
-/// path's centre of curvature.
-pub const LEAST_NEARNESS: f64 = 0.1;
 
 /// A vehicle against the closest point of its path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,8 +32,8 @@ pub struct Deviation {
 impl Deviation {
     /// Whether the vehicle is so near the path's centre of curvature, or beyond, that 1 − d_e c_c is limited.
     pub fn is_singular(&self) -> bool {
-        // A comparison that what is no number fails.
-        !(1.0 - self.d_e * self.c_c >= LEAST_NEARNESS)
+        let nearness = 1.0 - self.d_e * self.c_c;
+        nearness < LEAST_NEARNESS || nearness.is_nan()
     }
 
     /// 1 − d_e c_c, at least [`LEAST_NEARNESS`].

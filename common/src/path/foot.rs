@@ -10,7 +10,10 @@ use nalgebra::{Vector2, Vector3};
 
 use super::closest::refine;
 use super::{Path, PathPoint};
-use crate::following::trimming::LEAST_NEARNESS;
+
+/// Least 1 − d c_c at which the foot is followed, d to the left: (2.9) and (2.10) hold only where it is positive, that is, on
+/// the vehicle's side of the path's centre of curvature.
+pub const LEAST_NEARNESS: f64 = 0.1;
 
 /// Samples of a search within half a turn to either side.
 const SAMPLES: i32 = 64;
@@ -18,6 +21,8 @@ const SAMPLES: i32 = 64;
 const MANY_SAMPLES: i32 = 2000;
 /// Newton steps; four are many.
 const STEPS: usize = 20;
+/// A step so short, in metres and relative to where the vehicle is, is the last: the next one would be rounding.
+const CONVERGED: f64 = 1e-13;
 /// A distance must be this much smaller, relatively, to be preferred to one that is nearer along the path.
 const CLOSER: f64 = 1e-9;
 
@@ -49,7 +54,7 @@ impl Foot {
             let (r, c_c) = (foot.point.r(), foot.point.curvature());
             // d/ds of the distance along the tangent is −(1 − d c_c).
             let nearness = 1.0 - across * c_c;
-            if !(nearness >= LEAST_NEARNESS && r > 0.0) {
+            if nearness < LEAST_NEARNESS || nearness.is_nan() || r <= 0.0 {
                 break;
             }
             // Not more than a radian at a time, beyond which the circle bends back.
@@ -60,7 +65,7 @@ impl Foot {
                 break;
             }
             foot = Foot { xi, point: path.at(xi) };
-            if step.abs() <= 2.0 * f64::EPSILON * xi.abs().max(1.0) {
+            if step.abs() * r <= CONVERGED * (1.0 + position.norm()) {
                 return (foot, false);
             }
         }
@@ -143,6 +148,21 @@ mod tests {
         assert!(searched && centre.xi.is_finite());
         let (nowhere, searched) = foot.follow(&path, Vector2::repeat(f64::NAN));
         assert!(searched && nowhere.xi.is_finite());
+    }
+
+    #[test]
+    fn rounding_is_not_taken_for_a_singular_place() {
+        // Far from the origin, and slow: coordinates have many digits in front of the point.
+        let centre = Vector3::new(4321.987, -8765.4321, 0.0);
+        let path = Circle::new(centre, 3.0, Turn::Left, 0.7, 0.9).unwrap();
+        let mut foot = Foot::locate(&path, centre.xy() + Vector2::new(3.1, 0.0), 0.0);
+        for step in 0..20_000 {
+            let angle = 0.0123 * f64::from(step);
+            let position = centre.xy() + 3.1 * Vector2::new(angle.cos(), angle.sin());
+            let (next, searched) = foot.follow(&path, position);
+            assert!(!searched && (next.xi - foot.xi).abs() < 0.02, "{step}");
+            foot = next;
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! |---|---|---|
 //! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
 //! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
+//! | learned speeds: leader, gateway, row | sections 2.2 to 2.4 | `learned_speeds.rs` |
 //! | solutions I to III | Propositions 3.4, 3.5 | `solutions.rs` |
 //! | weighted links, moving pattern | Remark 3.10, section 3.3.3 | `weights_and_patterns.rs` |
 //! | one-way links, one told vehicle | Propositions 3.6, 3.7, Remark 3.13 | `directed.rs` |
@@ -22,6 +23,7 @@ mod delayed;
 mod directed;
 mod fleet;
 mod introduction;
+mod learned_speeds;
 mod network;
 mod solutions;
 mod switching;
@@ -98,6 +100,15 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
     match &case.mission.law_choice {
         LawChoice::Introduction(law) => introduction::rows(case, law),
         LawChoice::LeaderIntegral(law) => introduction::rows_of_a_leader(case, law),
+        LawChoice::LeaderFollower(law) => learned_speeds::rows_of_a_leader(case, law),
+        LawChoice::Gateway(law) => {
+            learned_speeds::rows_of_a_gateway(case, &law.gateway, law.a, vec![law.b, law.c], law.b0)
+        }
+        LawChoice::GatewayIntegral(law) => {
+            learned_speeds::rows_of_a_gateway(case, &law.gateway, law.a, vec![law.b, law.c, law.d], law.b0)
+        }
+        LawChoice::Neighbours(law) => learned_speeds::rows_of_a_row(case, law),
+        law @ (LawChoice::Alone(_) | LawChoice::SquareWave(_)) => learned_speeds::rows_of_nothing(case, law),
         LawChoice::Solution2(law) if !case.network.graph.is_undirected() => {
             directed::rows_of_solution_2(case, law.a, law.b)
         }

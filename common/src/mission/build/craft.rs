@@ -3,17 +3,24 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::file::{
-    AuvModel, FollowingChoice, FollowingType, ModelChoice, Proposition31 as PropFile, Theorem47 as TheoremFile,
+    AuvModel, DerivativeChoice, FollowingChoice, FollowingType, ModelChoice, Proposition31 as PropFile,
+    Theorem47 as TheoremFile,
 };
 use super::super::{Start, VehiclePlan};
 use crate::coordination::DemandKind;
 use crate::craft::auv::AuvCraft;
 use crate::craft::kinematic::KinematicCraft;
 use crate::craft::robot::{RobotCraft, SpeedLoop};
+use crate::craft::trimming::TrimmingCraft;
 use crate::craft::{Craft, Limits};
+use crate::following::decoupling_2_14::Decoupling;
+use crate::following::h2_figure_2_4::Disturbances;
 use crate::following::line_of_sight::LineOfSight;
+use crate::following::output_feedback_2_3::OutputFeedback;
 use crate::following::proposition_3_1::{Approach, Gains as RobotGains, Proposition31};
+use crate::following::state_transformation_2_19::StateTransformation;
 use crate::following::theorem_4_7::{Gains as AuvGains, TargetMotion, Theorem47};
+use crate::following::trimming::{Derivative, Placement, TrimmingLaw};
 use crate::path::Path;
 use crate::vehicle::auv::{Auv, AuvParameters, AuvState};
 use crate::vehicle::dynamic_unicycle::{Parameters, State};
@@ -46,6 +53,23 @@ pub(in crate::mission) fn craft(
             let craft = RobotCraft::new(plan.path.clone(), law, speed_loop, parameters, state, start.xi)?;
             Ok(Box::new(craft.limited(plan.limits)))
         }
+        (
+            ModelChoice::DynamicUnicycle(body),
+            FollowingChoice::Decoupling(_)
+            | FollowingChoice::OutputFeedback(_)
+            | FollowingChoice::StateTransformation(_),
+        ) => {
+            let parameters = Parameters { mass: body.mass_kg, inertia: body.inertia_kgm2 }.checked()?;
+            let [x, y, _] = start.position;
+            let state = State { x, y, heading: start.yaw, speed: start.speed, turn_rate: 0.0 };
+            let (law, k_0) = trimming_law(&plan.following, plan.path.at(start.xi).curvature())?;
+            let speed_loop = match demand {
+                DemandKind::Acceleration => SpeedLoop::Acceleration,
+                DemandKind::Rate => SpeedLoop::Rate { k_0 },
+            };
+            let craft = TrimmingCraft::new(plan.path.clone(), law, speed_loop, parameters, state, start.xi)?;
+            Ok(Box::new(craft.limited(plan.limits)))
+        }
         (ModelChoice::UnderactuatedAuv(model), FollowingChoice::Theorem47(gains)) => {
             let auv = limited(auv(*model), &plan.limits)?;
             let motion = match gains.kind {
@@ -62,6 +86,30 @@ pub(in crate::mission) fn craft(
         }
         _ => Err("the following law does not fit the vehicle".to_string()),
     }
+}
+
+/// The law of chapter 2 of a choice, for a path that begins with this curvature, and the gain of its speed loop.
+fn trimming_law(choice: &FollowingChoice, c_c: f64) -> Result<(Box<dyn TrimmingLaw>, f64), String> {
+    let derivative = |choice: &DerivativeChoice| match choice {
+        DerivativeChoice::Exact => Derivative::Exact,
+        DerivativeChoice::Filtered(filter) => Derivative::Filtered { tau: filter.tau_s },
+    };
+    Ok(match choice {
+        FollowingChoice::Decoupling(g) => {
+            let placement = Placement::new(g.lambda_p, g.v_min_mps)?;
+            (Box::new(Decoupling::new(placement, derivative(&g.derivative))?), g.k_speed)
+        }
+        FollowingChoice::OutputFeedback(g) => {
+            let disturbances =
+                Disturbances { heading: g.heading_disturbance, torque: g.torque_disturbance, noise: g.noise };
+            let law = OutputFeedback::new(g.design_speed_mps, c_c, disturbances, derivative(&g.derivative))?;
+            (Box::new(law), g.k_speed)
+        }
+        FollowingChoice::StateTransformation(g) => {
+            (Box::new(StateTransformation::new(Placement::new(g.lambda_p, g.v_min_mps)?)), g.k_speed)
+        }
+        _ => return Err("the following law is none of chapter 2".to_string()),
+    })
 }
 
 fn robot_gains(file: &PropFile) -> RobotGains {

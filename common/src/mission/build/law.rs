@@ -9,9 +9,14 @@ use crate::coordination::decentralised_3_92::{Decentralised, Weighing};
 use crate::coordination::delayed_4_34::Delayed;
 use crate::coordination::delayed_4_42::DelayedAlone;
 use crate::coordination::directed_3_72::Directed;
+use crate::coordination::gateway_2_33::Gateway;
 use crate::coordination::introduction_1_5::Introduction;
 use crate::coordination::leader_1_5::LeaderIntegral;
+use crate::coordination::leader_follower_2_30::LeaderFollower;
+use crate::coordination::neighbours_2_7::Neighbours;
 use crate::coordination::pattern_3_70::MovingPattern;
+use crate::coordination::prescribed_2_6::{Alone, SquareWave};
+use crate::coordination::recruiting::Gains as Recruits;
 use crate::coordination::solution_1_3_43::SolutionOne;
 use crate::coordination::solution_2_3_44::SolutionTwo;
 use crate::coordination::solution_3_3_45::SolutionThree;
@@ -26,6 +31,19 @@ pub(in crate::mission) fn law(choice: &LawChoice, ids: &[&str]) -> Result<Arc<dy
     Ok(match choice {
         LawChoice::Introduction(g) => Arc::new(Introduction::new(g.gain)?),
         LawChoice::LeaderIntegral(g) => Arc::new(LeaderIntegral::new(index(&g.leader)?, g.a, g.b)?),
+        LawChoice::LeaderFollower(g) => {
+            Arc::new(LeaderFollower::new(index(&g.leader)?, g.a1, Recruits { a: g.a, b: g.b, c: g.c })?)
+        }
+        LawChoice::Gateway(g) => Arc::new(Gateway::new(index(&g.gateway)?, g.b0, Recruits { a: g.a, b: g.b, c: g.c })?),
+        LawChoice::GatewayIntegral(g) => {
+            let gains = Recruits { a: g.a, b: g.b, c: g.c };
+            Arc::new(Gateway::with_integral(index(&g.gateway)?, g.b0, gains, g.d)?)
+        }
+        LawChoice::Neighbours(g) => {
+            Arc::new(Neighbours::new(index(&g.told)?, g.b0, Recruits { a: g.a, b: g.b, c: g.c })?)
+        }
+        LawChoice::Alone(g) => Arc::new(Alone::new(g.a1)?),
+        LawChoice::SquareWave(g) => Arc::new(SquareWave::new(g.amplitude_mps2, g.period_s)?),
         LawChoice::Solution1(g) => Arc::new(SolutionOne::new(g.a)?),
         LawChoice::Solution2(g) => Arc::new(SolutionTwo::new(g.a, g.b)?),
         LawChoice::Solution3(g) => Arc::new(SolutionThree::new(g.a, g.b, g.x_m)?),
@@ -66,6 +84,12 @@ pub(in crate::mission) fn law_name(choice: &LawChoice) -> &'static str {
     match choice {
         LawChoice::Introduction(_) => "introduction",
         LawChoice::LeaderIntegral(_) => "leader_integral",
+        LawChoice::LeaderFollower(_) => "leader_follower",
+        LawChoice::Gateway(_) => "gateway",
+        LawChoice::GatewayIntegral(_) => "gateway_integral",
+        LawChoice::Neighbours(_) => "neighbours",
+        LawChoice::Alone(_) => "alone",
+        LawChoice::SquareWave(_) => "square_wave",
         LawChoice::Solution1(_) => "solution1",
         LawChoice::Solution2(_) => "solution2",
         LawChoice::Solution3(_) => "solution3",
@@ -85,6 +109,10 @@ pub(in crate::mission) fn law_name(choice: &LawChoice) -> &'static str {
 pub(in crate::mission) fn told(choice: &LawChoice) -> Option<(&'static str, &str)> {
     match choice {
         LawChoice::LeaderIntegral(g) => Some(("leader", &g.leader)),
+        LawChoice::LeaderFollower(g) => Some(("leader", &g.leader)),
+        LawChoice::Gateway(g) => Some(("gateway", &g.gateway)),
+        LawChoice::GatewayIntegral(g) => Some(("gateway", &g.gateway)),
+        LawChoice::Neighbours(g) => Some(("told", &g.told)),
         LawChoice::TrulyDecentralised(g) => Some(("told", &g.told)),
         _ => None,
     }

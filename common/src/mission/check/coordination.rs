@@ -93,6 +93,39 @@ pub(super) fn check_weights(
     }
 }
 
+/// Under the laws of section 2.2 who talks with whom is part of the law: each link that it needs must be there.
+pub(super) fn check_partners(
+    faults: &mut Collector<'_>,
+    file: &MissionFile,
+    ids: &HashMap<String, usize>,
+    links: &[Link],
+) {
+    let n = file.vehicles.len();
+    let hub = build::told(&file.coordination.law).and_then(|(_, id)| ids.get(id).copied());
+    // (from, to) of every link that the law needs.
+    let needed: Vec<(usize, usize)> = match (&file.coordination.law, hub) {
+        (LawChoice::LeaderFollower(_), Some(hub)) => (0..n).filter(|&i| i != hub).map(|i| (hub, i)).collect(),
+        (LawChoice::Gateway(_) | LawChoice::GatewayIntegral(_), Some(hub)) => {
+            (0..n).filter(|&i| i != hub).flat_map(|i| [(hub, i), (i, hub)]).collect()
+        }
+        (LawChoice::Neighbours(_), _) => (1..n).flat_map(|i| [(i - 1, i), (i, i - 1)]).collect(),
+        _ => return,
+    };
+    let name = build::law_name(&file.coordination.law);
+    for (from, to) in needed {
+        if !links.iter().any(|link| (link.from, link.to) == (from, to)) {
+            let id = |i: usize| &file.vehicles[i].id;
+            let found = format!("no link from {} to {}, under {name}", id(from), id(to));
+            let allowed = match &file.coordination.law {
+                LawChoice::LeaderFollower(_) => "a link from the leader to every other vehicle",
+                LawChoice::Neighbours(_) => "links between vehicles that are next to one another in the file",
+                _ => "links between the gateway and every other vehicle",
+            };
+            faults.fault("network.links", found, allowed);
+        }
+    }
+}
+
 /// Where one vehicle alone is told v_L, its word must reach every other.
 pub(super) fn check_told(faults: &mut Collector<'_>, file: &MissionFile, ids: &HashMap<String, usize>, links: &[Link]) {
     let Some((part, id)) = build::told(&file.coordination.law) else { return };

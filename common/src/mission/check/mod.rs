@@ -8,7 +8,7 @@ mod vehicle;
 
 use std::collections::HashMap;
 
-use self::coordination::{check_law, check_told, check_weights};
+use self::coordination::{check_law, check_partners, check_told, check_weights};
 use self::network::{check_links, check_medium, check_switching, with_preset};
 use self::time::{check_formation, check_times};
 use self::vehicle::check_vehicle;
@@ -48,6 +48,9 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let links = check_links(faults, file, &network, &ids);
     check_weights(faults, file, &ids, links.as_deref().unwrap_or(&[]));
     check_told(faults, file, &ids, links.as_deref().unwrap_or(&[]));
+    if let Some(links) = links.as_deref() {
+        check_partners(faults, file, &ids, links);
+    }
     let switching = check_switching(faults, file, &network, &ids, links.as_deref().unwrap_or(&[]));
     let medium = check_medium(faults, file, &network, &ids);
     let fastest = speed.as_ref().map_or(0.0, SpeedProfile::fastest);

@@ -46,7 +46,8 @@ pub(super) fn check_vehicle(
         );
     }
     if following.is_none() {
-        let allowed = "a following law here or in [fleet]: line_of_sight, proposition31 or theorem47";
+        let allowed = "a following law here or in [fleet]: line_of_sight, proposition31, decoupling, output_feedback, state_transformation or \
+                       theorem47";
         faults.fault(&key, "no following", allowed);
     }
     let disturbances = check_disturbances(faults, file, index);
@@ -121,10 +122,18 @@ fn check_fit(
 ) -> bool {
     let (fits, law_of_model) = match (model, following) {
         (ModelChoice::KinematicUnicycle, FollowingChoice::LineOfSight(_))
-        | (ModelChoice::DynamicUnicycle(_), FollowingChoice::Proposition31(_))
+        | (
+            ModelChoice::DynamicUnicycle(_),
+            FollowingChoice::Proposition31(_)
+            | FollowingChoice::Decoupling(_)
+            | FollowingChoice::OutputFeedback(_)
+            | FollowingChoice::StateTransformation(_),
+        )
         | (ModelChoice::UnderactuatedAuv(_), FollowingChoice::Theorem47(_)) => (true, ""),
         (ModelChoice::KinematicUnicycle, _) => (false, "line_of_sight with kinematic_unicycle"),
-        (ModelChoice::DynamicUnicycle(_), _) => (false, "proposition31 with dynamic_unicycle"),
+        (ModelChoice::DynamicUnicycle(_), _) => {
+            (false, "proposition31, decoupling, output_feedback or state_transformation with dynamic_unicycle")
+        }
         (ModelChoice::UnderactuatedAuv(_), _) => (false, "theorem47 with underactuated_auv"),
     };
     if !fits {
@@ -224,6 +233,9 @@ pub(super) fn model_name(model: &ModelChoice) -> &'static str {
 fn following_name(following: &FollowingChoice) -> &'static str {
     match following {
         FollowingChoice::LineOfSight(_) => "line_of_sight",
+        FollowingChoice::Decoupling(_) => "decoupling",
+        FollowingChoice::OutputFeedback(_) => "output_feedback",
+        FollowingChoice::StateTransformation(_) => "state_transformation",
         FollowingChoice::Proposition31(_) => "proposition31",
         FollowingChoice::Theorem47(_) => "theorem47",
     }

@@ -41,6 +41,18 @@ pub enum LawChoice {
     Introduction(GainOnly),
     /// After (1.5): two vehicles on lines, one of which learns v_L.
     LeaderIntegral(LeaderIntegral),
+    /// Leader and followers, (2.30) and (2.31).
+    LeaderFollower(LeaderFollower),
+    /// Gateway, (2.33) and (2.34).
+    Gateway(Gateway),
+    /// Gateway with the extra integrator, section 2.5.3.
+    GatewayIntegral(GatewayIntegral),
+    /// Neighbours in a row, Figure 2.7.
+    Neighbours(NeighboursInARow),
+    /// Every vehicle by itself, (2.30).
+    Alone(Alone),
+    /// The same square wave of force for every vehicle, Figure 2.6.
+    SquareWave(SquareWave),
     /// Solution I, (3.43).
     Solution1(Solution1),
     /// Solution II, (3.44).
@@ -83,6 +95,84 @@ pub struct LeaderIntegral {
     pub a: f64,
     /// b_2 of the integral (1/s²); a² gives a double root at -a.
     pub b: f64,
+}
+
+/// Who leads, and the gains of (2.30) and (2.31).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct LeaderFollower {
+    /// The vehicle that is told v_L; the others learn their speeds from it.
+    pub leader: String,
+    /// a_1 of the leader (1/s).
+    pub a1: f64,
+    /// a_i of the followers, the same for all (1/s).
+    pub a: f64,
+    /// b_i, the same for all (1/s²).
+    pub b: f64,
+    /// c_i, the same for all (1/s³); below a b.
+    pub c: f64,
+}
+
+/// Which vehicle is the gateway, and the gains of (2.33) and (2.34).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Gateway {
+    /// The vehicle that is told v_L and talks with all others.
+    pub gateway: String,
+    /// b_0 of the gateway (1/s²).
+    pub b0: f64,
+    /// a_i, the same for all (1/s).
+    pub a: f64,
+    /// b_i, the same for all (1/s²).
+    pub b: f64,
+    /// c_i, the same for all (1/s³); below a b.
+    pub c: f64,
+}
+
+/// The same with the extra integrator of section 2.5.3.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct GatewayIntegral {
+    /// The vehicle that is told v_L and talks with all others.
+    pub gateway: String,
+    /// b_0 of the gateway (1/s²).
+    pub b0: f64,
+    /// a_i, the same for all (1/s).
+    pub a: f64,
+    /// b_i, the same for all (1/s²).
+    pub b: f64,
+    /// c_i, the same for all (1/s³); below a b.
+    pub c: f64,
+    /// d_i, the same for all (1/s⁴); below (a b - c) c / a².
+    pub d: f64,
+}
+
+/// Who is told v_L, and the gains of neighbours in a row.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct NeighboursInARow {
+    /// The vehicle that is told v_L.
+    pub told: String,
+    /// b_0 of the told vehicle (1/s²).
+    pub b0: f64,
+    /// a, the same for all (1/s).
+    pub a: f64,
+    /// b, the same for all (1/s²).
+    pub b: f64,
+    /// c, the same for all (1/s³); below a b.
+    pub c: f64,
+}
+
+/// Gain of (2.30) for every vehicle.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct Alone {
+    /// a_1, the same for all (1/s).
+    pub a1: f64,
+}
+
+/// The force of Figure 2.6, over the vehicle's mass.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct SquareWave {
+    /// Acceleration, forward in the first half of each period and backward in the second (m/s²).
+    pub amplitude_mps2: f64,
+    /// Period (s).
+    pub period_s: f64,
 }
 
 /// Gains of (3.43).

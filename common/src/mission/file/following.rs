@@ -9,6 +9,12 @@ use serde::{Deserialize, Serialize};
 pub enum FollowingChoice {
     /// Line of sight, (1.4).
     LineOfSight(LineOfSight),
+    /// Chapter 2, full state by the D-methodology, (2.14) to (2.16).
+    Decoupling(Decoupling),
+    /// Chapter 2, from the distance and the turning rate alone, Figures 2.3 and 2.4.
+    OutputFeedback(OutputFeedback),
+    /// Chapter 2, state transformation, (2.17) to (2.19).
+    StateTransformation(StateTransformation),
     /// Proposition 3.1 with Appendix 6.1.
     Proposition31(Proposition31),
     /// Theorem 4.7, with the roll treatment of docs/errata.md.
@@ -20,6 +26,93 @@ pub enum FollowingChoice {
 pub struct LineOfSight {
     /// Look-ahead distance Δ (m).
     pub distance_m: f64,
+}
+
+/// Where the derivatives of the D-methodology come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DerivativeChoice {
+    /// Exact ones.
+    #[default]
+    Exact,
+    /// s/(τ s + 1) of what is measured.
+    Filtered(Filtered),
+}
+
+/// The filter s/(τ s + 1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Filtered {
+    /// Time constant τ (s).
+    pub tau_s: f64,
+}
+
+/// Gains of (2.14) to (2.16).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct Decoupling {
+    /// All four eigenvalues are placed at -λ_p (1/s).
+    pub lambda_p: f64,
+    /// Slower vehicles are reckoned with this speed in gain scheduling (m/s).
+    pub v_min_mps: f64,
+    /// Where the derivatives come from.
+    pub derivative: DerivativeChoice,
+    /// Gain of the speed loop when the coordination law gives a rate (1/s).
+    pub k_speed: f64,
+}
+
+impl Default for Decoupling {
+    fn default() -> Self {
+        Decoupling { lambda_p: 1.0, v_min_mps: 0.05, derivative: DerivativeChoice::Exact, k_speed: 2.0 }
+    }
+}
+
+/// The design of Figures 2.3 and 2.4.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct OutputFeedback {
+    /// The speed that the controller is designed for, whatever the vehicle's is (m/s).
+    pub design_speed_mps: f64,
+    /// Disturbance of the heading that the design reckons with (rad/s).
+    pub heading_disturbance: f64,
+    /// Disturbance of the turning acceleration (rad/s²).
+    pub torque_disturbance: f64,
+    /// Noise of the measurements of turning rate (rad/s), distance (m) and its integral (m s).
+    pub noise: [f64; 3],
+    /// Where the derivatives come from.
+    pub derivative: DerivativeChoice,
+    /// Gain of the speed loop when the coordination law gives a rate (1/s).
+    pub k_speed: f64,
+}
+
+impl Default for OutputFeedback {
+    fn default() -> Self {
+        OutputFeedback {
+            design_speed_mps: 0.4,
+            heading_disturbance: 1.0,
+            torque_disturbance: 1.0,
+            noise: [0.1; 3],
+            derivative: DerivativeChoice::Exact,
+            k_speed: 2.0,
+        }
+    }
+}
+
+/// Gains of (2.19) with (2.16).
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct StateTransformation {
+    /// All four eigenvalues are placed at -λ_p (1/s).
+    pub lambda_p: f64,
+    /// Slower vehicles are reckoned with this speed in gain scheduling (m/s).
+    pub v_min_mps: f64,
+    /// Gain of the speed loop when the coordination law gives a rate (1/s).
+    pub k_speed: f64,
+}
+
+impl Default for StateTransformation {
+    fn default() -> Self {
+        StateTransformation { lambda_p: 1.0, v_min_mps: 0.05, k_speed: 2.0 }
+    }
 }
 
 /// Gains of Proposition 3.1.
