@@ -25,6 +25,8 @@ use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::state::CoordinationState;
 use common::wire::vehicle::{FromVehicle, Phase, ToVehicle};
 use cpf_tests::{Ground, mission, mission_text, program};
+use mission_control::sweep::plan::Plan as SweepPlan;
+use mission_control::sweep::setting::Setting;
 use zenoh::Wait;
 
 fn main() {
@@ -37,6 +39,7 @@ fn main() {
     for (name, bench) in [
         ("machines", machines as fn()),
         ("simulate", simulate),
+        ("sweep", sweep),
         ("stepped", stepped),
         ("hop", hop),
         ("throughput", throughput),
@@ -108,6 +111,21 @@ fn simulate() {
         std::fs::remove_file(path).expect("was written");
     });
     row("the same with the recording written", &format!("{recorded:.0} vehicle-seconds per CPU-second"));
+}
+
+/// How many short missions a sweep flies, on all cores and per core.
+fn sweep() {
+    let text = mission_text("missions/studies/base/loss-delay.toml");
+    let settings = vec![Setting::parse("network.loss=0:0.9:0.1").expect("a setting")];
+    let plan = SweepPlan::new("loss-delay.toml", mission(&text), settings, 40).expect("sound");
+    let begun = Instant::now();
+    let swept = mission_control::sweep::sweep(&plan, &Ground::new().path("sweep"), |_, _| true).expect("swept");
+    let rate = swept.runs.len() as f64 / begun.elapsed().as_secs_f64();
+    let cores = mission_control::batch::cores();
+    row(
+        &format!("sweep of a mission of 25 s with three vehicles on {cores} cores"),
+        &format!("{rate:.0} missions per second, {:.0} per second and core", rate / cores as f64),
+    );
 }
 
 // --- stepped processes -------------------------------------------------------------------------------------------------

@@ -86,12 +86,11 @@ fn heat_map(plan: &Plan, cells: &[CellStatistics], measure: usize) -> Option<Dra
         let median = cell.spreads[measure].map_or(lowest, |spread| spread.median);
         if wide { median.log10() } else { median }
     };
-    // The first row is drawn at the top: the largest value of the first key goes there.
+    // Rows are drawn from the bottom up, as an axis goes.
     let columns = across.values.len();
-    let rows: Vec<Vec<f64>> = cells.chunks(columns).map(|row| row.iter().map(shade).collect()).collect();
+    let data: Vec<Vec<f64>> = cells.chunks(columns).map(|row| row.iter().map(shade).collect()).collect();
     let names = |setting: &Setting| setting.values.iter().map(shown).collect::<Vec<String>>();
     let legend = if wide { "log₁₀" } else { "" };
-    let data: Vec<Vec<f64>> = rows.into_iter().rev().collect();
     let map = Heatmap::new().with_data(data).with_color_map(ColorMap::Viridis).with_legend(legend);
     let plots = vec![map.into()];
     let title = format!("{}{}", if wide { "log₁₀ of the " } else { "" }, about(measure));
