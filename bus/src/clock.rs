@@ -103,6 +103,30 @@ pub fn sharpen_this_thread() {
     }
 }
 
+/// Lets something happen, but not more often than once in a period of wall clock.
+#[derive(Clone, Copy, Debug)]
+pub struct AtMostEvery {
+    period: Duration,
+    last: Option<Instant>,
+}
+
+impl AtMostEvery {
+    /// Nothing has happened yet.
+    pub fn new(period: Duration) -> AtMostEvery {
+        AtMostEvery { period, last: None }
+    }
+
+    /// Whether it is time again.
+    pub fn is_due(&self) -> bool {
+        self.last.is_none_or(|last| last.elapsed() >= self.period)
+    }
+
+    /// It happens now.
+    pub fn happened(&mut self) {
+        self.last = Some(Instant::now());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

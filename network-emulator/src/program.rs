@@ -7,6 +7,7 @@ use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use bus::Plane;
+use bus::clock::AtMostEvery;
 use bus::console::{Parent, StopFlag};
 use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::logs::Logs;
@@ -81,7 +82,7 @@ pub fn run(args: Args) -> ExitCode {
         ids: BTreeMap::new(),
         seats: Vec::new(),
         burst: Burst::default(),
-        overrun: Overrun::default(),
+        overrun: Overrun { noted: 0, pace: AtMostEvery::new(OVERRUN_PERIOD) },
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
@@ -120,10 +121,10 @@ fn take_shortcut(program: &Arc<Shared<HubPort>>, bell: Bell<HubEvent>) {
 }
 
 /// States that came faster than they could be decided about.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Overrun {
     noted: u64,
-    at: Option<Instant>,
+    pace: AtMostEvery,
 }
 
 /// How much was sent of late.
@@ -204,8 +205,7 @@ impl HubPort {
     /// Notes, once a second, how many states were dropped before they could be decided about.
     fn note_overrun(&mut self, hub: &Hub) {
         let dropped = self.switchboard.dropped();
-        let fresh = self.overrun.at.is_none_or(|at| at.elapsed() >= OVERRUN_PERIOD);
-        if dropped > self.overrun.noted && fresh && hub.phase() == Phase::Running {
+        if dropped > self.overrun.noted && self.overrun.pace.is_due() && hub.phase() == Phase::Running {
             let note = NoteRow {
                 t_ns: hub.mission_time().nanos().max(0),
                 source: HUB.into(),
@@ -213,7 +213,8 @@ impl HubPort {
                 count: dropped - self.overrun.noted,
             };
             self.logs.write(Row::Clock(ClockRecord::Note(note)));
-            self.overrun = Overrun { noted: dropped, at: Some(Instant::now()) };
+            self.overrun.noted = dropped;
+            self.overrun.pace.happened();
         }
     }
 

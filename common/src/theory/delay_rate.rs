@@ -71,7 +71,8 @@ pub fn rightmost(k: f64, mu: Complex<f64>, tau: Span) -> Complex<f64> {
 pub fn rate(graph: &Graph, k: f64, tau: Span) -> Option<f64> {
     let n = graph.len();
     let everybody_hears = (0..n).all(|i| graph.degree(i) > 0);
-    if n < 2 || !everybody_hears || !graph.can_agree() || !(k > 0.0 && k.is_finite()) {
+    let usable = k > 0.0 && k.is_finite();
+    if n < 2 || !everybody_hears || !graph.can_agree() || !usable {
         return None;
     }
     let averages = DMatrix::identity(n, n) - graph.normalised_laplacian();

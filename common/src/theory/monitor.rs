@@ -149,10 +149,10 @@ impl Watch {
         const NAME: &str = "Theorem 4.4";
         let Seen { alpha, t_0, .. } = self.seen;
         let coordination = Coordination::new(graphs, gains, alpha);
-        if self.asks(NAME, "α", alpha, 1.0) {
-            if let (Some(coordination), Some(t_0)) = (coordination, t_0) {
-                self.promises(NAME, Some((coordination.rate_of_agreement(), coordination.overshoot(t_0))));
-            }
+        if self.asks(NAME, "α", alpha, 1.0)
+            && let (Some(coordination), Some(t_0)) = (coordination, t_0)
+        {
+            self.promises(NAME, Some((coordination.rate_of_agreement(), coordination.overshoot(t_0))));
         }
     }
 
@@ -203,8 +203,7 @@ impl Watch {
         let mut closest = 0.0f64;
         for &(t, error) in errors {
             let allowed = envelope.at(t - start) * initial + tolerance;
-            // Also for errors that are no numbers.
-            if !(error <= allowed) {
+            if error > allowed || error.is_nan() {
                 return Judgement::Defect { envelope, at: t, found: error, allowed };
             }
             closest = closest.max(if allowed > 0.0 { error / allowed } else { 0.0 });

@@ -142,9 +142,9 @@ impl Word {
     /// The bytes that go on the air.
     pub fn encode(&self) -> Vec<u8> {
         let state = &self.state;
-        let flags = u8::from(state.scalar.is_some()) * HAS_SCALAR
-            | u8::from(self.asks) * ASKS
-            | (self.count as u8) << COUNT_SHIFT;
+        let flags = (u8::from(state.scalar.is_some()) * HAS_SCALAR)
+            | (u8::from(self.asks) * ASKS)
+            | ((self.count as u8) << COUNT_SHIFT);
         let mut bytes = Vec::with_capacity(STATE_LIMIT);
         bytes.extend_from_slice(&MAGIC);
         bytes.extend_from_slice(&super::PROTOCOL.to_le_bytes());

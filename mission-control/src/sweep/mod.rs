@@ -163,7 +163,7 @@ mod tests {
         assert!(row.contains(&format!("seed: {}", plan.seed(0, 0))) && row.contains("outcome: \"finished\""), "{row}");
         show(&plan, &swept, delivered, "mission-control sweep", &out).expect("written");
         let page = fs::read_to_string(out.join("README.md")).expect("a page");
-        assert!(page.contains("sweep.svg") && page.contains(&plan.replay(0, 0)), "{page}");
+        assert!(page.contains("sweep.svg") && page.contains(&plan.replay(1, 0)), "{page}");
     }
 
     #[test]
