@@ -77,6 +77,14 @@ impl<E> Inbox<E> {
         self.phase() == OPEN
     }
 
+    /// Whether messages may be sent: also by a program that heard that the line opens a moment before it does.
+    pub(crate) fn lets_send(&self) -> bool {
+        self.is_open() || {
+            let _opening = self.lock();
+            self.is_open()
+        }
+    }
+
     /// Whether the two ends have not shaken hands yet.
     pub(crate) fn is_waiting(&self) -> bool {
         self.phase() == WAITING

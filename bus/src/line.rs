@@ -149,7 +149,7 @@ impl Line {
     /// On the state plane the message is dropped if the hub does not keep up. On the mission plane it waits in the
     /// line's backlog; it is lost only with the line, which the program then hears as [`LineEvent::Lost`].
     pub fn send(&self, plane: Plane, bytes: &[u8]) -> Result<()> {
-        let inbox = self.shared.inbox().filter(|inbox| inbox.is_open()).ok_or(Error::NotConnected)?;
+        let inbox = self.shared.inbox().filter(|inbox| inbox.lets_send()).ok_or(Error::NotConnected)?;
         inbox.outbox.send(plane, bytes)
     }
 

@@ -216,7 +216,7 @@ impl Switchboard {
     /// the line's backlog; it is lost only with the line, which the hub then hears as [`HubEvent::Left`].
     pub fn send(&self, line: LineId, plane: Plane, bytes: &[u8]) -> Result<()> {
         let line = self.lines.get(line).ok_or(Error::NoSuchLine)?;
-        let inbox = line.inbox().filter(|inbox| inbox.is_open()).ok_or(Error::NotConnected)?;
+        let inbox = line.inbox().filter(|inbox| inbox.lets_send()).ok_or(Error::NotConnected)?;
         inbox.outbox.send(plane, bytes)
     }
 

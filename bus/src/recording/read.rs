@@ -391,7 +391,8 @@ mod tests {
                 }
             }
         }
-        assert!(skipped > 150 && skipped > 10 * ended, "{skipped} skipped, {ended} ended");
+        // Damage in what a chunk holds is skipped; damage in its header, a few bytes, may end the reading.
+        assert!(skipped > 150 && skipped > 5 * ended, "{skipped} skipped, {ended} ended");
     }
 
     #[test]

