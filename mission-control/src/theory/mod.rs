@@ -1,8 +1,8 @@
 //! Theory beside measurement: the conditions of the statements that speak about a mission, and what they promise.
 //!
-//! Each family of laws has a file with two functions of a [`Case`]: `rows`, the statements behind its laws, and
-//! `guarantee`, the decay of the coordination error that they promise. A new law needs a line in [`law_rows`], and one in
-//! [`guarantee_of`] if there is a rate.
+//! Each family of laws has a file with two functions of a `Case`: `rows`, the statements behind its laws, and
+//! `guarantee`, the decay of the coordination error that they promise. A new law needs a line in `law_rows`, and one in
+//! `guarantee_of` if there is a rate.
 //!
 //! | what | source | file |
 //! |---|---|---|
