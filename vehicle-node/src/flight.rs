@@ -223,10 +223,8 @@ impl Flight {
             && let Some(xi) = self.neighbours.formation_xi(t, |scalar| self.law.neighbour_rate(reference, scalar))
         {
             self.craft.place_target(xi + pattern.h);
-            // What the law has gathered meanwhile was about another place.
-            self.law = self.mission.law.vehicle(self.me);
             self.rejoining = false;
-            // The place where it was before is not a past of this place.
+            // What the law has gathered meanwhile was about another place.
             self.law = self.mission.law.vehicle(self.me);
         }
         let mut own = self.craft.own(reference);
