@@ -156,7 +156,7 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     missing.extend(merged.damaged.iter().map(|(path, chunks, cause)| {
         format!("{chunks} damaged pieces of {} are left out; the first: {cause}", file_name(path))
     }));
-    missing.extend(late_beginnings(&plan.mission, &merged));
+    missing.extend(late_beginnings(&plan.mission, plan.pace, &merged));
     if let Some(line) = line {
         // What is on disk here need not be kept there.
         let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
@@ -173,9 +173,19 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     Ok(Flown { folder, phase, summary, missing })
 }
 
+/// How late a vehicle may begin that did not begin in mid-flight \[s of wall clock\].
+const LATE_START_S: f64 = 0.5;
+
 /// Vehicles whose states begin in mid-flight, in words: an earlier life of theirs recorded elsewhere.
-fn late_beginnings(mission: &Mission, merged: &Merged) -> Vec<String> {
-    let late = |id: &str| merged.begins.get(id).copied().filter(|begin| *begin > 0);
+fn late_beginnings(mission: &Mission, pace: Pace, merged: &Merged) -> Vec<String> {
+    // A busy machine misses the first control periods of a flight.
+    let grace = match pace {
+        Pace::Real { speed_up } => {
+            mission.control_period * mission.record_ticks + Span::from_secs(LATE_START_S * speed_up)
+        }
+        Pace::Stepped => Span::ZERO,
+    };
+    let late = |id: &str| merged.begins.get(id).copied().filter(|begin| *begin > grace.nanos());
     let late = mission.vehicles.iter().filter_map(|vehicle| Some((&vehicle.id, late(&vehicle.id)?)));
     late.map(|(id, begin)| {
         let begin = Time::from_nanos(begin);
