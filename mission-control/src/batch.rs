@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::channel;
+use std::sync::mpsc::sync_channel;
 use std::thread;
 
 use bus::recording::Recording;
@@ -66,7 +66,8 @@ pub fn on_all_cores<T: Sync, R: Send>(
 ) {
     let next = AtomicUsize::new(0);
     thread::scope(|scope| {
-        let (results, finished) = channel();
+        // Nobody works far ahead of what is done with the results.
+        let (results, finished) = sync_channel(cores());
         for _ in 0..cores().min(items.len()) {
             let (results, next, work) = (results.clone(), &next, &work);
             scope.spawn(move || {

@@ -2,17 +2,20 @@
 //!
 //! Where gains are asked for, they are the k_i > 0 of K = diag(k_i), one per vehicle; β := K⁻¹1.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
 use super::Graph;
 
 /// Eigenvalues of a symmetric matrix in increasing order; only its lower triangle is read. None at all if it holds
-/// something that is not a finite number.
+/// something that is not a finite number (or should the iteration not settle, which has not been seen).
 pub fn symmetric_eigenvalues(matrix: &DMatrix<f64>) -> Vec<f64> {
     if matrix.is_empty() || matrix.iter().any(|entry| !entry.is_finite()) {
         return Vec::new();
     }
-    let mut eigenvalues: Vec<f64> = matrix.symmetric_eigenvalues().iter().copied().collect();
+    // Two or three steps for each eigenvalue are usual.
+    let most_steps = 300 * matrix.nrows();
+    let Some(found) = SymmetricEigen::try_new(matrix.clone(), f64::EPSILON, most_steps) else { return Vec::new() };
+    let mut eigenvalues: Vec<f64> = found.eigenvalues.iter().copied().collect();
     eigenvalues.sort_unstable_by(f64::total_cmp);
     eigenvalues
 }
