@@ -106,6 +106,8 @@ pub enum Quantity {
     XiDifference,
     /// The same with the pattern removed.
     CoordinationError,
+    /// Way along its path of the first vehicle since the start, less that of each other.
+    LengthDifference,
     /// Greatest difference between any two vehicles, with the pattern removed.
     Disagreement,
     /// Forward speed.

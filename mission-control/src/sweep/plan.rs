@@ -41,6 +41,7 @@ impl Plan {
     /// # Errors
     /// Which cell cannot be flown, and why.
     pub fn new(file: &str, mission: Arc<Mission>, settings: Vec<Setting>, repeats: u32) -> Result<Plan, String> {
+        let settings: Vec<Setting> = settings.into_iter().map(|setting| setting.of(&mission.text)).collect();
         if let Some(twice) = settings.iter().enumerate().find(|(i, s)| settings[..*i].iter().any(|o| o.key == s.key)) {
             return Err(format!("--set {}: found twice; allowed: once, with all of its values", twice.1.key));
         }
