@@ -32,8 +32,9 @@ fn counted_warnings_of_a_flight_are_told_and_stay_out_of_the_json() {
     let folder = tempfile::tempdir().expect("a folder");
     let mission = folder.path().join("centre.toml");
     std::fs::write(&mission, at_the_centre).expect("written");
-    let (mission, out) = (mission.display().to_string(), folder.path().join("run").display().to_string());
-    for json in [&[][..], &["--json"]] {
+    let mission = mission.display().to_string();
+    for (name, json) in [("plain", &[][..]), ("piped", &["--json"])] {
+        let out = folder.path().join(name).display().to_string();
         let flown = run(&[&["simulate", &mission, "--out", &out], json].concat());
         let told = String::from_utf8_lossy(&flown.stderr).into_owned();
         assert!(told.contains("warning: r1: ") && told.contains(" control periods."), "{told}");

@@ -93,14 +93,15 @@ impl Subject<'_> {
                 dash: index,
                 series,
             };
-            all.push(Series::all(quantity, flight).into_iter().filter(shown).map(drawn).collect());
+            all.push(
+                Series::all(quantity, flight, symbol_of(panel, flight)).into_iter().filter(shown).map(drawn).collect(),
+            );
         }
         if !several {
             all.iter_mut().flatten().for_each(|drawn| drawn.dash = 0);
         } else if all.iter().all(|of_mission| of_mission.len() == 1) {
             for drawn in all.iter_mut().flatten() {
                 (drawn.colour, drawn.name) = (drawn.dash, self.label(drawn.dash).to_owned());
-                drawn.dash = 0;
             }
         }
         all.into_iter().flatten().collect()
@@ -129,7 +130,7 @@ impl Subject<'_> {
                 line.with_color(PLANNED).with_stroke_width(1.4).with_dotted()
             });
         }
-        let symbol = flights.first().map_or("ξ", |(_, flight)| flight.facts.symbol());
+        let symbol = flights.first().map_or("ξ", |(_, flight)| symbol_of(section, flight));
         let y_label = section.label.clone().unwrap_or_else(|| label(quantity, symbol));
         let mut layout = panel.layout(title, "time [s]", &y_label).with_x_axis_min(from).with_x_axis_max(to);
         if section.log {
@@ -174,7 +175,7 @@ impl Subject<'_> {
                 let points: Vec<(f64, f64)> =
                     track.rows.iter().map(|row| view.see([row.x_m, row.y_m, row.z_m])).collect();
                 let start = points[0];
-                let (hue, dash) = if one_each { (*index, 0) } else { (*vehicle, place) };
+                let (hue, dash) = (if one_each { *index } else { *vehicle }, place);
                 let name = match (one_each, chosen.len() > 1) {
                     (true, _) => self.label(*index).to_owned(),
                     (false, true) => format!("{}: {}", self.label(*index), track.id),
@@ -196,6 +197,11 @@ impl Subject<'_> {
         let layout = panel.layout(title, x_label, y_label).with_equal_aspect();
         panel.laid_out(layout)
     }
+}
+
+/// What coordination states are called in a panel.
+fn symbol_of<'a>(panel: &'a PanelSection, flight: &'a Flight) -> &'a str {
+    panel.symbol.as_deref().unwrap_or(flight.facts.symbol())
 }
 
 /// The vehicles at an instant, as arrowheads that point where they head, and a line through them.

@@ -22,12 +22,13 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// All series of a quantity: one per vehicle, per vehicle but the first, or one.
-    pub(super) fn all(quantity: Quantity, flight: &Flight) -> Vec<Series> {
+    /// All series of a quantity: one per vehicle, per vehicle but the first, or one. `symbol` is what coordination states are
+    /// called.
+    pub(super) fn all(quantity: Quantity, flight: &Flight, symbol: &str) -> Vec<Series> {
         let tracks = tracks(&flight.recording.exact, &flight.facts);
         match quantity {
-            Quantity::XiDifference => differences(flight, &tracks, true),
-            Quantity::CoordinationError => differences(flight, &tracks, false),
+            Quantity::XiDifference => differences(flight, &tracks, symbol, true),
+            Quantity::CoordinationError => differences(flight, &tracks, symbol, false),
             Quantity::LengthDifference => length_differences(flight, &tracks),
             Quantity::Disagreement => {
                 let coordination = Coordination::of(&tracks, &flight.facts);
@@ -52,12 +53,11 @@ fn each(tracks: &[Track<'_>], points: impl Fn(&Track<'_>) -> Vec<(f64, f64)>) ->
 }
 
 /// ξ_1 − ξ_j for every other vehicle.
-fn differences(flight: &Flight, tracks: &[Track<'_>], with_pattern: bool) -> Vec<Series> {
+fn differences(flight: &Flight, tracks: &[Track<'_>], symbol: &str, with_pattern: bool) -> Vec<Series> {
     let Coordination { t_s, states } = Coordination::of(tracks, &flight.facts);
     // Vehicles without rows have no states; the mission's own order is that of the tracks that have some.
     let present: Vec<usize> = (0..tracks.len()).filter(|&i| !tracks[i].rows.is_empty()).collect();
     let Some(&first) = present.first() else { return Vec::new() };
-    let symbol = flight.facts.symbol();
     let other = |(at, &vehicle): (usize, &usize)| {
         let offset = |t_s: f64| {
             let h = |vehicle: usize| tracks[vehicle].pattern.at(Time::from_secs(t_s)).h;

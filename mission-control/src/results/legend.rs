@@ -257,7 +257,7 @@ mod tests {
     fn a_legend_goes_into_the_corner_where_the_lines_are_not() {
         for (slope, right, upper) in [(1.0, true, false), (-1.0, true, true)] {
             let curve: Vec<(f64, f64)> = (0..100).map(|step| (f64::from(step), slope * f64::from(step))).collect();
-            let fitted = fitted(layout(&[curve.clone()]), &[curve], 1, SIZE);
+            let fitted = fitted(layout(std::slice::from_ref(&curve)), &[curve], 1, SIZE);
             let [left, top, ..] = legend(&fitted, 1);
             assert_eq!((left > SIZE.0 / 2.0, top < SIZE.1 / 2.0), (right, upper), "slope {slope}");
         }
@@ -274,9 +274,7 @@ mod tests {
     #[test]
     fn a_panel_full_of_curves_gets_a_longer_axis() {
         let full: Vec<Vec<(f64, f64)>> = (0..4)
-            .map(|phase| {
-                (0..400).map(|step| f64::from(step)).map(|t| (t, (0.9 * t + f64::from(phase)).sin())).collect()
-            })
+            .map(|phase| (0..400).map(f64::from).map(|t| (t, (0.9 * t + f64::from(phase)).sin())).collect())
             .collect();
         let before = ComputedLayout::from_layout(&layout(&full)).y_range;
         let fitted = fitted(layout(&full), &full, 4, SIZE);

@@ -2,7 +2,7 @@
 
 use super::cells::CellStatistics;
 use super::measure::MEASURES;
-use super::page::short;
+use super::page::{short, to_digits};
 use super::plan::Plan;
 use super::setting::{Setting, shown};
 
@@ -22,7 +22,7 @@ pub(super) fn of_sweep(plan: &Plan, cells: &[CellStatistics], measure: usize) ->
     let median =
         |last: &[usize]| Some(cells.get(corner(last))?.spreads[measure]?.median).filter(|median| *median > 0.0);
     let first = median(&[])?;
-    let times = |last: &[usize]| Some(format!("{} times as much", short(median(last)? / first)));
+    let times = |last: &[usize]| Some(format!("{} times as much", to_digits(median(last)? / first, 3)));
     let span = |index: usize| {
         let Setting { key, values } = &plan.settings[index];
         format!("`{key}` = {}", values.last().map(shown).unwrap_or_default())
@@ -39,7 +39,7 @@ pub(super) fn of_sweep(plan: &Plan, cells: &[CellStatistics], measure: usize) ->
         .collect();
     (!parts.is_empty()).then(|| {
         let about = MEASURES[measure].about;
-        format!("Found: {} {about} with {}; {}.", short(first), begin.join(" and "), parts.join(", "))
+        format!("Found ({about}): {} with {}; {}.", short(first), begin.join(" and "), parts.join(", "))
     })
 }
 
@@ -65,19 +65,19 @@ pub(super) fn against(sweeps: &[(&str, &[CellStatistics])], measure: usize, over
         let ratios = || all.iter().map(|(_, takes)| takes[index] / takes[best]);
         let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
         format!(
-            "{} takes {} there, {} times as many ({} to {} times between {} and {})",
+            "{} takes {}, {} times as many (between {} and {}: {} to {} times)",
             sweeps[index].0,
             whole(middle[index]),
-            short(middle[index] / middle[best]),
-            short(least),
-            short(most),
+            to_digits(middle[index] / middle[best], 2),
             short(low),
-            short(high)
+            short(high),
+            to_digits(least, 2),
+            to_digits(most, 2)
         )
     });
     let others: Vec<String> = others.collect();
     let (best, taken) = (sweeps[best].0, whole(middle[best]));
-    Some(format!("Found: for a {about} of {}, {best} takes {taken} {what}; {}.", short(*value), others.join(", ")))
+    Some(format!("Found: for {} ({about}) {best} takes {taken} {what}; {}.", short(*value), others.join(", ")))
 }
 
 /// Medians of a sweep: of one measure, and of another; in the order of the first.
@@ -132,10 +132,10 @@ mod tests {
         let cells: Vec<CellStatistics> = [2.0, 3.0, 4.0, 5.0, 6.0, 12.0].map(|value| cell(&[(0, value)])).into();
         let found = of_sweep(&plan, &cells, 0).expect("a finding");
         for part in [
-            "2.000 coordination error at the start with",
-            "2.500 times as much with `network.loss.bernoulli.probability` = 0.5",
-            "2.000 times as much with `network.delay.constant.delay_s` = 2",
-            "6.000 times as much with both",
+            "Found (coordination error at the start): 2.000 with `network.loss.bernoulli.probability` = 0",
+            "2.50 times as much with `network.loss.bernoulli.probability` = 0.5",
+            "2.00 times as much with `network.delay.constant.delay_s` = 2",
+            "6.00 times as much with both",
         ] {
             assert!(found.contains(part), "{found}");
         }
@@ -151,11 +151,9 @@ mod tests {
         };
         let (often, seldom) = (sweep(1000.0, &[1e3, 1e4, 1e5]), sweep(250.0, &[2e4, 200.0, 2e3]));
         let found = against(&[("often", &often), ("seldom", &seldom)], error, bytes).expect("a finding");
-        assert!(
-            found.contains("of 0.1118, seldom takes 2236 bytes on the air; often takes 8944 there, 4.000 times"),
-            "{found}"
-        );
-        assert!(found.contains("(4.000 to 4.000 times between 0.01250 and 1.000)"), "{found}");
+        let expected = "Found: for 0.1118 (coordination error at the start) seldom takes 2236 bytes on the air; often takes 8944, \
+                        4.0 times as many (between 0.01250 and 1.000: 4.0 to 4.0 times).";
+        assert_eq!(found, expected);
         let apart = sweep(1.0, &[1e3]);
         assert_eq!(against(&[("often", &often), ("apart", &apart)], error, bytes), None);
     }

@@ -86,11 +86,16 @@ fn capitalised(text: &str) -> String {
 
 /// Four digits.
 pub(super) fn short(value: f64) -> String {
+    to_digits(value, 4)
+}
+
+/// A number with so many digits that matter.
+pub(super) fn to_digits(value: f64, digits: u32) -> String {
     let magnitude = value.abs();
     if value == 0.0 {
         "0".into()
     } else if (1e-3..1e7).contains(&magnitude) {
-        let decimals = (3.0 - magnitude.log10().floor()).clamp(0.0, 6.0) as usize;
+        let decimals = (f64::from(digits) - 1.0 - magnitude.log10().floor()).clamp(0.0, 6.0) as usize;
         format!("{value:.decimals$}")
     } else {
         format!("{value:.2e}")

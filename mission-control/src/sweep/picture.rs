@@ -9,16 +9,14 @@ use toml::Value;
 
 use super::cells::{CellStatistics, Spread};
 use super::measure::MEASURES;
-use super::page::short;
+use super::page::to_digits;
 use super::parquet::number;
 use super::plan::Plan;
 use super::setting::{Setting, shown};
 use crate::results::drawing::{Drawing, PLANNED, Panel, colour, render};
 
-/// From this ratio of the largest to the smallest value on, an axis is logarithmic.
-const DECADES: f64 = 100.0;
-/// The same for a scale of colours, on which steps are told apart worse.
-const COLOUR_DECADES: f64 = 8.0;
+/// From this ratio of the largest to the smallest value on, an axis or a scale of colours is logarithmic.
+const WIDE: f64 = 6.0;
 /// Most heat maps side by side in one picture, and in a row.
 const MOST_MAPS: usize = 9;
 const MAPS_IN_A_ROW: usize = 3;
@@ -66,9 +64,9 @@ fn about(measure: usize) -> &'static str {
 }
 
 /// Whether values are better seen on a logarithmic axis.
-fn is_wide(values: impl Iterator<Item = f64> + Clone, ratio: f64) -> bool {
+fn is_wide(values: impl Iterator<Item = f64> + Clone) -> bool {
     let (low, high) = (values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max));
-    low > 0.0 && high / low >= ratio
+    low > 0.0 && high / low >= WIDE
 }
 
 fn curve(plan: &Plan, cells: &[CellStatistics], measure: usize) -> Option<Drawing> {
@@ -91,7 +89,8 @@ fn curve(plan: &Plan, cells: &[CellStatistics], measure: usize) -> Option<Drawin
 
 fn logarithmic(layout: Layout, points: &[(f64, Spread)]) -> Layout {
     let bounds = points.iter().flat_map(|(_, spread)| <[f64; 2]>::from(sure(spread)));
-    if is_wide(bounds, DECADES) { layout.with_log_y() } else { layout }
+    let layout = if is_wide(bounds) { layout.with_log_y() } else { layout };
+    if is_wide(points.iter().map(|(x, _)| *x)) { layout.with_log_x() } else { layout }
 }
 
 /// The interval of a median; the median alone if there are too few runs for one.
@@ -124,7 +123,7 @@ impl Scale {
     /// From the least to the greatest median; `None` if no cell has one.
     fn of(cells: &[CellStatistics], measure: usize) -> Option<Scale> {
         let medians = cells.iter().filter_map(|cell| Some(cell.spreads[measure]?.median));
-        let log = is_wide(medians.clone(), COLOUR_DECADES);
+        let log = is_wide(medians.clone());
         let scale = Scale { low: f64::INFINITY, high: f64::NEG_INFINITY, log };
         let scale = medians.map(|median| scale.place(median)).fold(scale, |scale, place| Scale {
             low: scale.low.min(place),
@@ -179,7 +178,7 @@ fn heat_map(
         .with_x_categories(names(across))
         .with_y_categories(names(down))
         .with_colorbar_tick_format(TickFormat::Custom(Arc::new(move |place| {
-            short(if scale.log { 10_f64.powf(place) } else { place })
+            to_digits(if scale.log { 10_f64.powf(place) } else { place }, 2)
         })));
     layout.show_legend = false;
     if !missing.is_empty() {
@@ -212,10 +211,7 @@ pub fn against(sweeps: &[(&str, &[CellStatistics])], measure: usize, over: usize
     if all.is_empty() {
         return None;
     }
-    let mut layout = logarithmic(panel.layout("", about(over), about(measure)), &all);
-    if is_wide(all.iter().map(|(x, _)| *x), DECADES) {
-        layout = layout.with_log_x();
-    }
+    let layout = logarithmic(panel.layout("", about(over), about(measure)), &all);
     Some(render(name, 1, 1, vec![panel.laid_out(layout)]))
 }
 
