@@ -50,7 +50,9 @@ pub fn picture(plan: &Plan, cells: &[CellStatistics], measure: usize, name: &str
 fn title(measure: usize, of: Option<(&str, &Value)>) -> String {
     match of {
         // The whole path would not fit above a map.
-        Some((key, value)) => format!("{} = {}", key.rsplit('.').next().unwrap_or(key), shown(value)),
+        Some((key, value)) => {
+            format!("{}, {} = {}", about(measure), key.rsplit('.').next().unwrap_or(key), shown(value))
+        }
         None => about(measure).into(),
     }
 }
@@ -178,7 +180,7 @@ fn heat_map(
         .with_x_categories(names(across))
         .with_y_categories(names(down))
         .with_colorbar_tick_format(TickFormat::Custom(Arc::new(move |place| {
-            to_digits(if scale.log { 10_f64.powf(place) } else { place }, 2)
+            to_digits(if scale.log { 10_f64.powf(place) } else { place }, 3)
         })));
     layout.show_legend = false;
     if !missing.is_empty() {
