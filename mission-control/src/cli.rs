@@ -76,7 +76,8 @@ enum What {
     Sweep {
         /// The mission file
         mission: PathBuf,
-        /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated
+        /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated. For short:
+        /// network.loss, network.delay, and coordination.GAIN for a gain of the mission's law
         #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
         sets: Vec<String>,
         /// Runs of every combination, each with a seed of its own
@@ -402,6 +403,7 @@ fn changed(mission: Arc<Mission>, sets: &[String], seed: Option<u64>) -> Result<
     if settings.is_empty() {
         return Ok(mission);
     }
+    let settings: Vec<Setting> = settings.into_iter().map(|setting| setting.of(&mission.text)).collect();
     let changes: Vec<_> = settings.iter().map(|setting| (setting.key.as_str(), &setting.values[0])).collect();
     let text = plan::apply(&mission.text, &changes)?;
     Mission::parse(folder::MISSION, &text).map(Arc::new).map_err(|faults| faults.to_string())
@@ -498,7 +500,8 @@ fn run_fleet(args: RunArgs) -> Ended {
 
 /// What came of a flight, for a person or a pipe.
 fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missing: &[String], json: bool) -> Ended {
-    for text in missing {
+    // On standard error, so that a pipe gets the numbers alone; they are among the warnings there too.
+    for text in missing.iter().chain(&summary.warnings) {
         bus::remark!("warning: {text}");
     }
     if json {

@@ -13,6 +13,7 @@ const PLAIN_PERIOD: Duration = Duration::from_secs(5);
 pub struct Progress {
     bar: Option<ProgressBar>,
     end: Time,
+    begun: Instant,
     last_line: Instant,
     last_step: String,
 }
@@ -26,7 +27,7 @@ impl Progress {
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar
         });
-        Progress { bar, end, last_line: Instant::now(), last_step: String::new() }
+        Progress { bar, end, begun: Instant::now(), last_line: Instant::now(), last_step: String::new() }
     }
 
     /// Mission time `now` is reached.
@@ -50,16 +51,17 @@ impl Progress {
 
     /// `done` of `all` pieces of work are done.
     pub fn counted(&mut self, step: &str, done: usize, all: usize) {
+        let left = left(self.begun.elapsed(), done, all.saturating_sub(done));
         match &self.bar {
             Some(bar) => {
                 bar.set_length(all as u64);
                 bar.set_prefix(step.to_string());
                 bar.set_position(done as u64);
-                bar.set_message(format!("{done} / {all}"));
+                bar.set_message(format!("{done} / {all}{left}"));
             }
             None => {
                 if self.last_step != step || self.last_line.elapsed() >= PLAIN_PERIOD {
-                    bus::remark!("{step}: {done} of {all}");
+                    bus::remark!("{step}: {done} of {all}{left}");
                     self.last_line = Instant::now();
                     self.last_step = step.to_string();
                 }
@@ -83,10 +85,27 @@ impl Progress {
     }
 }
 
+/// How long the rest will take if it goes on as it went; empty as long as nothing is known.
+fn left(elapsed: Duration, done: usize, rest: usize) -> String {
+    if done == 0 || rest == 0 {
+        return String::new();
+    }
+    let seconds = (elapsed.as_secs_f64() * rest as f64 / done as f64).ceil();
+    let (hours, minutes) = ((seconds / 3600.0).floor(), (seconds / 60.0).ceil());
+    match seconds {
+        ..120.0 => format!(", about {seconds} s left"),
+        ..7200.0 => format!(", about {minutes} min left"),
+        _ => format!(", about {hours} h {} min left", ((seconds - 3600.0 * hours) / 60.0).floor()),
+    }
+}
+
 /// Progress through a number of things.
 pub struct Count {
     bar: Option<ProgressBar>,
     step: String,
+    begun: Instant,
+    /// How many were done at first: these took no time.
+    found: Option<usize>,
     reached: usize,
     of: usize,
     last_line: Instant,
@@ -97,29 +116,33 @@ impl Count {
     pub fn new(step: &str, of: usize) -> Count {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(of.max(1) as u64);
-            let style = ProgressStyle::with_template("{prefix:>10} [{bar:40}] {pos}/{len} {eta} {msg}");
+            let style = ProgressStyle::with_template("{prefix:>10} [{bar:40}] {percent:>3}% {pos}/{len}{msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
             bar.set_prefix(step.to_string());
             bar
         });
-        Count { bar, step: step.to_string(), reached: 0, of, last_line: Instant::now() }
+        let now = Instant::now();
+        Count { bar, step: step.to_string(), begun: now, found: None, reached: 0, of, last_line: now }
     }
 
     /// One more is done.
     pub fn one_more(&mut self, message: &str) {
+        self.found.get_or_insert(0);
         self.reach(self.reached + 1, message);
     }
 
-    /// So many are done.
+    /// So many are done; the first time, so many were done before.
     pub fn reach(&mut self, count: usize, message: &str) {
         self.reached = count;
+        let done = count - (*self.found.get_or_insert(count)).min(count);
+        let left = left(self.begun.elapsed(), done, self.of.saturating_sub(count));
         match &self.bar {
             Some(bar) => {
                 bar.set_position(self.reached as u64);
-                bar.set_message(message.to_string());
+                bar.set_message(format!("{left} {message}"));
             }
             None if self.last_line.elapsed() >= PLAIN_PERIOD => {
-                bus::remark!("{}: {} of {}  {message}", self.step, self.reached, self.of);
+                bus::remark!("{}: {} of {}{left} {message}", self.step, self.reached, self.of);
                 self.last_line = Instant::now();
             }
             None => {}
@@ -131,5 +154,27 @@ impl Count {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rest_takes_as_long_as_what_is_done() {
+        let after = |seconds: u64, done: usize, rest: usize| left(Duration::from_secs(seconds), done, rest);
+        assert_eq!(after(10, 100, 500), ", about 50 s left");
+        assert_eq!(after(60, 10, 55), ", about 6 min left");
+        assert_eq!(after(600, 1, 13), ", about 2 h 10 min left");
+        assert_eq!((after(5, 0, 10), after(5, 10, 0)), (String::new(), String::new()));
+    }
+
+    #[test]
+    fn what_was_there_before_took_no_time() {
+        let mut count = Count::new("sweeping", 600);
+        count.reach(500, "");
+        count.reach(520, "");
+        assert_eq!((count.found, count.reached), (Some(500), 520));
     }
 }

@@ -1,6 +1,9 @@
 //! Compares a file with the schema of what it is read into, so that every unknown or missing key and every value of a
 //! wrong type is found at once, each with its line and what is allowed there.
 
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use schemars::JsonSchema;
 use serde_json::Value;
 use toml::de::{DeTable, DeValue};
@@ -10,13 +13,19 @@ use super::file::MissionFile;
 
 /// JSON schema of the mission file, for editors and for the check itself.
 pub fn schema() -> Value {
-    schema_of::<MissionFile>()
+    (*schema_of::<MissionFile>()).clone()
 }
 
-fn schema_of<T: JsonSchema>() -> Value {
-    let mut settings = schemars::generate::SchemaSettings::draft2020_12();
-    settings.inline_subschemas = true;
-    settings.into_generator().into_root_schema_for::<T>().to_value()
+/// The schema of `T`, made once: a sweep reads thousands of files of one kind, and making it takes longer than a short flight.
+fn schema_of<T: JsonSchema>() -> Arc<Value> {
+    static MADE: Mutex<BTreeMap<&str, Arc<Value>>> = Mutex::new(BTreeMap::new());
+    let make = || {
+        let mut settings = schemars::generate::SchemaSettings::draft2020_12();
+        settings.inline_subschemas = true;
+        Arc::new(settings.into_generator().into_root_schema_for::<T>().to_value())
+    };
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(std::any::type_name::<T>()).or_insert_with(make).clone()
 }
 
 /// Notes every difference in shape between a file and the schema of `T`.

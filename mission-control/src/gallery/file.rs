@@ -70,6 +70,8 @@ pub struct PanelSection {
     pub log: bool,
     /// What values are multiplied with, for another unit; then `label` is needed too.
     pub scale: Option<f64>,
+    /// What coordination states are called here, such as s̄, in place of ξ or γ.
+    pub symbol: Option<String>,
     /// Label of the vertical axis in place of the quantity's own.
     pub label: Option<String>,
     /// Expected values, drawn as dotted lines.
@@ -106,6 +108,8 @@ pub enum Quantity {
     XiDifference,
     /// The same with the pattern removed.
     CoordinationError,
+    /// Way along its path of the first vehicle since the start, less that of each other.
+    LengthDifference,
     /// Greatest difference between any two vehicles, with the pattern removed.
     Disagreement,
     /// Forward speed.

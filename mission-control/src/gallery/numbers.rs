@@ -23,7 +23,7 @@ pub(super) struct Verdict {
 pub(super) fn judge(expectation: &Expectation, flight: &Flight) -> Verdict {
     let measured = match (&expectation.number, expectation.series) {
         (Some(path), _) => of_summary(path, &flight.summary),
-        (None, Some(quantity)) => Series::all(quantity, flight)
+        (None, Some(quantity)) => Series::all(quantity, flight, flight.facts.symbol())
             .into_iter()
             .map(|series| {
                 let value = of_series(expectation, &series.points);

@@ -43,7 +43,7 @@ pub(super) fn draw(subject: &Subject<'_>) -> String {
             match (panel.plane, panel.over_time) {
                 (Some(plane), _) => subject.plane(panel, plane, &title),
                 (None, Some(quantity)) => subject.over_time(panel, quantity, &title, samples),
-                (None, None) => (Vec::new(), Layout::new((0.0, 1.0), (0.0, 1.0))),
+                (None, None) => Panel::default().laid_out(Layout::new((0.0, 1.0), (0.0, 1.0))),
             }
         })
         .collect();
@@ -93,14 +93,15 @@ impl Subject<'_> {
                 dash: index,
                 series,
             };
-            all.push(Series::all(quantity, flight).into_iter().filter(shown).map(drawn).collect());
+            all.push(
+                Series::all(quantity, flight, symbol_of(panel, flight)).into_iter().filter(shown).map(drawn).collect(),
+            );
         }
         if !several {
             all.iter_mut().flatten().for_each(|drawn| drawn.dash = 0);
         } else if all.iter().all(|of_mission| of_mission.len() == 1) {
             for drawn in all.iter_mut().flatten() {
                 (drawn.colour, drawn.name) = (drawn.dash, self.label(drawn.dash).to_owned());
-                drawn.dash = 0;
             }
         }
         all.into_iter().flatten().collect()
@@ -112,27 +113,24 @@ impl Subject<'_> {
         let (from, to) = (section.from_s.unwrap_or(0.0), section.to_s.unwrap_or(end));
         let scale = section.scale.unwrap_or(1.0);
         let in_log = |value: f64| if section.log { value.abs() } else { value };
-        let within =
-            |value: &f64| section.low.is_none_or(|low| *value >= low) && section.high.is_none_or(|h| *value <= h);
         let mut panel = Panel::default();
         for drawn in self.series(section, quantity) {
             let points: Vec<(f64, f64)> = drawn.series.points.iter().map(|(t, y)| (*t, in_log(y * scale))).collect();
             let points = points.into_iter().filter(|(t, y)| (from..=to).contains(t) && y.is_finite());
             let points: Vec<(f64, f64)> = points.filter(|point| !section.log || point.1 > 0.0).collect();
             let points = extremes(points, samples);
-            // The legend keeps clear of what is seen, not of what is cut off.
-            let seen: Vec<(f64, f64)> = points.iter().copied().filter(|point| within(&point.1)).collect();
-            let line = LinePlot::new().with_data(points).with_color(colour(drawn.colour));
-            panel.plots.push(dashed(line.with_stroke_width(1.5).with_legend(&drawn.name), drawn.dash).into());
-            panel.drawn.extend(seen);
-            panel.names.push(drawn.name);
+            panel.names.push(drawn.name.clone());
+            panel.line(points, |line| {
+                let line = line.with_color(colour(drawn.colour)).with_stroke_width(1.5);
+                dashed(line.with_legend(drawn.name), drawn.dash)
+            });
         }
         for level in &section.levels {
             panel.line(vec![(from, *level), (to, *level)], |line| {
                 line.with_color(PLANNED).with_stroke_width(1.4).with_dotted()
             });
         }
-        let symbol = flights.first().map_or("ξ", |(_, flight)| flight.facts.symbol());
+        let symbol = flights.first().map_or("ξ", |(_, flight)| symbol_of(section, flight));
         let y_label = section.label.clone().unwrap_or_else(|| label(quantity, symbol));
         let mut layout = panel.layout(title, "time [s]", &y_label).with_x_axis_min(from).with_x_axis_max(to);
         if section.log {
@@ -146,7 +144,7 @@ impl Subject<'_> {
                 layout = layout.with_shaded_region(outage);
             }
         }
-        (panel.plots, layout)
+        panel.laid_out(layout)
     }
 
     fn plane(&self, section: &PanelSection, plane: Plane, title: &str) -> Drawing {
@@ -177,7 +175,7 @@ impl Subject<'_> {
                 let points: Vec<(f64, f64)> =
                     track.rows.iter().map(|row| view.see([row.x_m, row.y_m, row.z_m])).collect();
                 let start = points[0];
-                let (hue, dash) = if one_each { (*index, 0) } else { (*vehicle, place) };
+                let (hue, dash) = (if one_each { *index } else { *vehicle }, place);
                 let name = match (one_each, chosen.len() > 1) {
                     (true, _) => self.label(*index).to_owned(),
                     (false, true) => format!("{}: {}", self.label(*index), track.id),
@@ -191,17 +189,30 @@ impl Subject<'_> {
                 panel.dot(start, PAPER, 2.2);
             }
             for t_s in &section.vehicles_at_s {
-                formation(&mut panel, &flown, *t_s, &view, VEHICLE * bounds.extent());
+                let hue = |vehicle: usize| colour(if one_each { *index } else { vehicle });
+                formation(&mut panel, &flown, *t_s, &view, VEHICLE * bounds.extent(), hue);
             }
         }
         let [x_label, y_label] = view.labels();
         let layout = panel.layout(title, x_label, y_label).with_equal_aspect();
-        (panel.plots, layout)
+        panel.laid_out(layout)
     }
 }
 
+/// What coordination states are called in a panel.
+fn symbol_of<'a>(panel: &'a PanelSection, flight: &'a Flight) -> &'a str {
+    panel.symbol.as_deref().unwrap_or(flight.facts.symbol())
+}
+
 /// The vehicles at an instant, as arrowheads that point where they head, and a line through them.
-fn formation(panel: &mut Panel, flown: &[(usize, &Track<'_>)], t_s: f64, view: &View, length: f64) {
+fn formation(
+    panel: &mut Panel,
+    flown: &[(usize, &Track<'_>)],
+    t_s: f64,
+    view: &View,
+    length: f64,
+    hue: impl Fn(usize) -> &'static str,
+) {
     let mut through = Vec::new();
     for (vehicle, track) in flown {
         let at = track.rows.partition_point(|row| (row.t_ns as f64) < t_s * 1e9 - 0.5).min(track.rows.len() - 1);
@@ -213,7 +224,7 @@ fn formation(panel: &mut Panel, flown: &[(usize, &Track<'_>)], t_s: f64, view: &
         };
         let outline = [corner(0.6, 0.0), corner(-0.4, 0.3), corner(-0.4, -0.3), corner(0.6, 0.0)];
         through.push(view.see([row.x_m, row.y_m, row.z_m]));
-        panel.line(outline.to_vec(), |line| line.with_color(colour(*vehicle)).with_stroke_width(1.8));
+        panel.line(outline.to_vec(), |line| line.with_color(hue(*vehicle)).with_stroke_width(1.8));
     }
     panel.line(through, |line| line.with_color(PLANNED).with_stroke_width(1.2));
 }

@@ -1,5 +1,6 @@
 //! The quantities of a flight over time, each with its label.
 
+use common::path::Path;
 use common::record::StateRow;
 use common::time::Time;
 
@@ -21,12 +22,14 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// All series of a quantity: one per vehicle, per vehicle but the first, or one.
-    pub(super) fn all(quantity: Quantity, flight: &Flight) -> Vec<Series> {
+    /// All series of a quantity: one per vehicle, per vehicle but the first, or one. `symbol` is what coordination states are
+    /// called.
+    pub(super) fn all(quantity: Quantity, flight: &Flight, symbol: &str) -> Vec<Series> {
         let tracks = tracks(&flight.recording.exact, &flight.facts);
         match quantity {
-            Quantity::XiDifference => differences(flight, &tracks, true),
-            Quantity::CoordinationError => differences(flight, &tracks, false),
+            Quantity::XiDifference => differences(flight, &tracks, symbol, true),
+            Quantity::CoordinationError => differences(flight, &tracks, symbol, false),
+            Quantity::LengthDifference => length_differences(flight, &tracks),
             Quantity::Disagreement => {
                 let coordination = Coordination::of(&tracks, &flight.facts);
                 let points = coordination.t_s.iter().copied().zip(coordination.spread()).collect();
@@ -50,12 +53,11 @@ fn each(tracks: &[Track<'_>], points: impl Fn(&Track<'_>) -> Vec<(f64, f64)>) ->
 }
 
 /// ξ_1 − ξ_j for every other vehicle.
-fn differences(flight: &Flight, tracks: &[Track<'_>], with_pattern: bool) -> Vec<Series> {
+fn differences(flight: &Flight, tracks: &[Track<'_>], symbol: &str, with_pattern: bool) -> Vec<Series> {
     let Coordination { t_s, states } = Coordination::of(tracks, &flight.facts);
     // Vehicles without rows have no states; the mission's own order is that of the tracks that have some.
     let present: Vec<usize> = (0..tracks.len()).filter(|&i| !tracks[i].rows.is_empty()).collect();
     let Some(&first) = present.first() else { return Vec::new() };
-    let symbol = flight.facts.symbol();
     let other = |(at, &vehicle): (usize, &usize)| {
         let offset = |t_s: f64| {
             let h = |vehicle: usize| tracks[vehicle].pattern.at(Time::from_secs(t_s)).h;
@@ -66,6 +68,39 @@ fn differences(flight: &Flight, tracks: &[Track<'_>], with_pattern: bool) -> Vec
         Series { vehicle: Some(vehicle), name, points: points.collect() }
     };
     present.iter().enumerate().skip(1).map(other).collect()
+}
+
+/// s_1 − s_j for every other vehicle, where the first has rows.
+fn length_differences(flight: &Flight, tracks: &[Track<'_>]) -> Vec<Series> {
+    let lengths: Vec<Vec<(f64, f64)>> =
+        tracks.iter().zip(&flight.mission.vehicles).map(|(track, plan)| lengths(&*plan.path, &track.rows)).collect();
+    let Some((first, others)) = lengths.split_first() else { return Vec::new() };
+    let difference = |other: &[(f64, f64)]| {
+        first.iter().filter_map(|(t, s)| Some((*t, s - value_at(other, *t)?))).collect::<Vec<(f64, f64)>>()
+    };
+    let series = |(at, other): (usize, &Vec<(f64, f64)>)| Series {
+        vehicle: Some(at + 1),
+        name: format!("s₁ − s{}", subscript(at + 2)),
+        points: difference(other),
+    };
+    others.iter().enumerate().map(series).collect()
+}
+
+/// Parts of a step between two rows in which a path counts as evenly parametrised.
+const PARTS: u32 = 10;
+
+/// The way along a path since the first row \[m\]: the integral of |p'(ξ)|, by the midpoints of small steps.
+fn lengths(path: &dyn Path, rows: &[&StateRow]) -> Vec<(f64, f64)> {
+    let mut length = 0.0;
+    let mut last = rows.first().map_or(0.0, |row| row.xi);
+    let mut at = |row: &&StateRow| {
+        let step = (row.xi - last) / f64::from(PARTS);
+        let middles = (0..PARTS).map(|part| last + (f64::from(part) + 0.5) * step);
+        length += middles.map(|xi| path.at(xi).r() * step).sum::<f64>();
+        last = row.xi;
+        (seconds(row), length)
+    };
+    rows.iter().map(&mut at).collect()
 }
 
 fn seconds(row: &StateRow) -> f64 {
@@ -100,9 +135,11 @@ fn of_row(quantity: Quantity, row: &StateRow) -> Option<f64> {
         Quantity::PathError => row.e_norm_m,
         Quantity::HeadingError => row.psi_e_rad,
         Quantity::Neighbours => f64::from(row.neighbours),
-        Quantity::YawRate | Quantity::XiDifference | Quantity::CoordinationError | Quantity::Disagreement => {
-            return None;
-        }
+        Quantity::YawRate
+        | Quantity::XiDifference
+        | Quantity::CoordinationError
+        | Quantity::LengthDifference
+        | Quantity::Disagreement => return None,
     })
 }
 
@@ -113,6 +150,7 @@ pub(super) fn label(quantity: Quantity, symbol: &str) -> String {
         Quantity::XiRate => format!("rate of {symbol} [1/s]"),
         Quantity::ReferenceRate => format!("commanded rate of {symbol} [1/s]"),
         Quantity::XiDifference | Quantity::CoordinationError => format!("{symbol}₁ − {symbol}ⱼ"),
+        Quantity::LengthDifference => "s₁ − sⱼ [m]".into(),
         Quantity::Disagreement => format!("max |{symbol}ᵢ − {symbol}ⱼ|"),
         Quantity::Speed => "speed [m/s]".into(),
         Quantity::X => "x [m]".into(),
@@ -153,6 +191,19 @@ mod tests {
         let found = [-0.1, 0.0, 0.25, 1.0, 1.1].map(|t| value_at(&points, t));
         assert_eq!(found, [None, Some(1.0), Some(1.5), Some(3.0), None]);
         assert_eq!(value_at(&[], 0.0), None);
+    }
+
+    #[test]
+    fn the_way_along_a_path_is_its_length_whatever_its_parameter() {
+        let text = include_str!("../../../missions/thesis/fig-2-11-ccw.toml");
+        let mission = common::mission::Mission::parse("m", text).expect("sound");
+        // A circle of 2 m, whose parameter is the angle.
+        let circle = &*mission.vehicles[0].path;
+        let row = |t_ns: i64, xi: f64| StateRow { xi, ..state_row(t_ns, "v", 0.0) };
+        let rows = [row(0, 1.0), row(1_000_000_000, 1.5), row(2_000_000_000, 1.25)];
+        let found = lengths(circle, &rows.iter().collect::<Vec<_>>());
+        let expected = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.5)];
+        assert!(found.iter().zip(expected).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-12), "{found:?}");
     }
 
     #[test]

@@ -54,7 +54,7 @@ impl Chart {
                 panel.names.push(name.clone());
             }
             if dots {
-                panel.drawn.extend(&points);
+                panel.drawn.extend(points.iter().map(|point| vec![*point]));
                 let scatter = ScatterPlot::new().with_data(points).with_color(colour(index)).with_size(2.0);
                 panel.plots.push(if named { scatter.with_legend(name) } else { scatter }.into());
             } else {
@@ -65,7 +65,7 @@ impl Chart {
             }
         }
         let layout = panel.layout(&self.title, &self.x, &self.y);
-        Figure { name: self.name, caption: self.caption, svg: render(self.name, 1, 1, vec![(panel.plots, layout)]) }
+        Figure { name: self.name, caption: self.caption, svg: render(self.name, 1, 1, vec![panel.laid_out(layout)]) }
     }
 }
 

@@ -5,11 +5,13 @@
 use std::fmt::Write as _;
 
 use kuva::backend::svg::SvgBackend;
-use kuva::plot::{LegendPosition, LinePlot, ScatterPlot};
+use kuva::plot::{LinePlot, ScatterPlot};
 use kuva::render::figure::Figure as Grid;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::theme::Theme;
+
+use super::legend::fitted;
 
 /// Colours of the paper, replaced by those of the page where a figure is shown inside one. No other element of a
 /// figure has them.
@@ -40,15 +42,15 @@ const HEIGHT: f64 = 360.0;
 #[derive(Default)]
 pub(crate) struct Panel {
     pub(crate) plots: Vec<Plot>,
-    /// Every point that is drawn, to place the legend where there are few.
-    pub(crate) drawn: Vec<(f64, f64)>,
+    /// Every curve that is drawn, to place the legend where there is none.
+    pub(crate) drawn: Vec<Vec<(f64, f64)>>,
     /// Names in the legend.
     pub(crate) names: Vec<String>,
 }
 
 impl Panel {
     pub(crate) fn line(&mut self, points: Vec<(f64, f64)>, style: impl FnOnce(LinePlot) -> LinePlot) {
-        self.drawn.extend(&points);
+        self.drawn.push(points.clone());
         self.plots.push(style(LinePlot::new().with_data(points)).into());
     }
 
@@ -70,7 +72,6 @@ impl Panel {
             .with_x_label_offset(0.0, -6.0)
             .with_theme(theme())
             .with_box_axes()
-            .with_legend_position(self.emptiest_corner())
             .with_title_size(15)
             .with_label_size(13)
             .with_tick_size(11)
@@ -80,32 +81,19 @@ impl Panel {
         layout
     }
 
-    /// The corner in which a legend hides the fewest points; the top right if there are several.
-    fn emptiest_corner(&self) -> LegendPosition {
-        let range = |value: fn(&(f64, f64)) -> f64| {
-            let values = || self.drawn.iter().map(value);
-            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
-        };
-        let ((left, right), (bottom, top)) = (range(|point| point.0), range(|point| point.1));
-        let longest = self.names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
-        let width = (0.13 + 0.016 * longest) * (right - left);
-        let height = (0.1 + 0.07 * self.names.len() as f64) * (top - bottom);
-        let corners = [
-            (LegendPosition::InsideTopRight, right - width, right, top - height, top),
-            (LegendPosition::InsideBottomRight, right - width, right, bottom, bottom + height),
-            (LegendPosition::InsideTopLeft, left, left + width, top - height, top),
-            (LegendPosition::InsideBottomLeft, left, left + width, bottom, bottom + height),
-        ];
-        let hidden = |corner: &(LegendPosition, f64, f64, f64, f64)| {
-            let (_, left, right, bottom, top) = corner;
-            self.drawn.iter().filter(|(x, y)| (*left..=*right).contains(x) && (*bottom..=*top).contains(y)).count()
-        };
-        corners.iter().min_by_key(|corner| hidden(corner)).map_or(LegendPosition::InsideTopRight, |corner| corner.0)
+    /// The panel with its layout, ready to be drawn.
+    pub(crate) fn laid_out(self, layout: Layout) -> Drawing {
+        Drawing { plots: self.plots, layout, curves: self.drawn, entries: self.names.len() }
     }
 }
 
 /// A panel that can be drawn.
-pub(crate) type Drawing = (Vec<Plot>, Layout);
+pub(crate) struct Drawing {
+    plots: Vec<Plot>,
+    layout: Layout,
+    curves: Vec<Vec<(f64, f64)>>,
+    entries: usize,
+}
 
 /// Colour of series number `index`.
 pub(crate) fn colour(index: usize) -> &'static str {
@@ -133,8 +121,12 @@ fn theme() -> Theme {
 
 /// Panels in rows and columns as an SVG; `name` must differ from that of any other figure on the same page.
 pub(crate) fn render(name: &str, rows: usize, columns: usize, panels: Vec<Drawing>) -> String {
-    let (plots, layouts) = panels.into_iter().unzip();
     let width = if columns == 1 { 1.6 * WIDTH } else { WIDTH };
+    let fit = |panel: Drawing| {
+        let layout = fitted(panel.layout, &panel.curves, panel.entries, (width, HEIGHT));
+        (panel.plots, layout)
+    };
+    let (plots, layouts) = panels.into_iter().map(fit).unzip();
     let grid = Grid::new(rows, columns).with_plots(plots).with_layouts(layouts).with_cell_size(width, HEIGHT);
     renumbered(&SvgBackend::new().render_scene(&grid.render()), name)
 }
@@ -180,16 +172,6 @@ pub(crate) fn extremes(points: Vec<(f64, f64)>, samples: usize) -> Vec<(f64, f64
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_legend_goes_where_the_lines_are_not() {
-        let mut panel = Panel::default();
-        panel.series((0..100).map(|step| (f64::from(step), f64::from(step))).collect(), 0, "rising");
-        assert!(matches!(panel.emptiest_corner(), LegendPosition::InsideBottomRight));
-        let mut panel = Panel::default();
-        panel.series((0..100).map(|step| (f64::from(step), -f64::from(step))).collect(), 0, "falling");
-        assert!(matches!(panel.emptiest_corner(), LegendPosition::InsideTopRight));
-    }
 
     #[test]
     fn no_peak_is_lost_by_thinning() {

@@ -9,7 +9,6 @@
 
 use bus::recording::Recording;
 use common::record::StateRow;
-use kuva::plot::LegendPosition;
 use kuva::plot::annotations::ShadedRegion;
 use kuva::render::layout::Layout;
 
@@ -123,9 +122,9 @@ impl View<'_> {
         }
         let unit = if self.facts.xi_unit.is_empty() { String::new() } else { format!(" [{}]", self.facts.xi_unit) };
         let layout = panel.layout("Decay of the coordination error", "time [s]", &format!("‖x − mean(x)‖{unit}"));
-        let layout = self.time_axis(layout).with_log_y().with_legend_position(LegendPosition::InsideTopRight);
+        let layout = self.time_axis(layout).with_log_y();
         let caption = "Norm of the coordination error on a logarithmic scale: a straight line is an exponential.";
-        Some(Figure { name: "rate", caption: caption.into(), svg: render("rate", 1, 1, vec![(panel.plots, layout)]) })
+        Some(Figure { name: "rate", caption: caption.into(), svg: render("rate", 1, 1, vec![panel.laid_out(layout)]) })
     }
 
     /// What the caption has to say about the panel of the coordination errors.
@@ -170,7 +169,7 @@ impl View<'_> {
             panel.dot(end, colour(index), 4.5);
         }
         let layout = panel.layout(title, "x [m]", "y [m]").with_equal_aspect();
-        (panel.plots, layout)
+        panel.laid_out(layout)
     }
 
     fn over_time(&self, title: &str, label: &str, value: impl Fn(&StateRow) -> f64) -> Drawing {
@@ -180,7 +179,7 @@ impl View<'_> {
             panel.series(points, index, track.id);
         }
         let layout = self.time_axis(panel.layout(title, "time [s]", label));
-        (panel.plots, layout)
+        panel.laid_out(layout)
     }
 
     fn coordination_errors(&self, title: &str) -> Drawing {
@@ -210,7 +209,7 @@ impl View<'_> {
                 layout = layout.with_shaded_region(outage);
             }
         }
-        (panel.plots, layout)
+        panel.laid_out(layout)
     }
 
     fn time_axis(&self, layout: Layout) -> Layout {

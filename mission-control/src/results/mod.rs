@@ -17,6 +17,7 @@ mod export;
 mod facts;
 mod figures;
 mod folder;
+mod legend;
 pub(crate) mod network;
 pub(crate) mod report;
 mod series;

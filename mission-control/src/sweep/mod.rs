@@ -8,13 +8,15 @@
 //! | [`measure`] | the numbers kept of every run |
 //! | [`store`] | `runs.csv`, appended to as runs are over |
 //! | `parquet` | `runs.parquet` |
-//! | [`cells`] | `cells.csv`: mean, median and 5 to 95 % of every cell |
-//! | [`picture`] | heat map or curve |
+//! | [`cells`] | `cells.csv`: mean, median with its confidence, 5 to 95 % of every cell, and the command that flies it again |
+//! | [`picture`] | curve, heat map, or several heat maps |
+//! | `finding` | a sentence about what was found |
 //! | `page` | `README.md` |
 //! | [`study`] | several sweeps and a picture of them, from a file |
 
 pub mod cells;
 pub mod change;
+mod finding;
 pub mod measure;
 mod page;
 mod parquet;

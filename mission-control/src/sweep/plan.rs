@@ -41,6 +41,7 @@ impl Plan {
     /// # Errors
     /// Which cell cannot be flown, and why.
     pub fn new(file: &str, mission: Arc<Mission>, settings: Vec<Setting>, repeats: u32) -> Result<Plan, String> {
+        let settings: Vec<Setting> = settings.into_iter().map(|setting| setting.of(&mission.text)).collect();
         if let Some(twice) = settings.iter().enumerate().find(|(i, s)| settings[..*i].iter().any(|o| o.key == s.key)) {
             return Err(format!("--set {}: found twice; allowed: once, with all of its values", twice.1.key));
         }
@@ -167,7 +168,7 @@ mod tests {
                 &["network.loss=0.5,1.5"][..],
                 "with --set network.loss.bernoulli.probability=1.5: network.loss.bernoulli.probability: found 1.5; allowed: ",
             ),
-            (&["coordination.gain=1"][..], "coordination.gain: found an unknown key; allowed: "),
+            (&["coordination.b0=1"][..], "coordination.b0: found an unknown key; allowed: "),
             (&["duration_s=1", "duration_s=2"][..], "--set duration_s: found twice"),
             (&["duration_s=1:10000:1", "seed=1:1000:1"][..], "found 10000000 runs"),
         ] {

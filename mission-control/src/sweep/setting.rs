@@ -37,6 +37,22 @@ impl Setting {
         }
         Ok(Setting { key: full_key(key, &values), values })
     }
+
+    /// The setting for a mission: a gain may be named without the mission's law, `coordination.gain` for
+    /// `coordination.law.switching.gain`.
+    pub fn of(self, mission: &str) -> Setting {
+        let key = self.key.strip_prefix("coordination.").and_then(|gain| gain_of_law(mission, gain));
+        Setting { key: key.unwrap_or(self.key), ..self }
+    }
+}
+
+/// The whole key of a gain that the mission's law has.
+fn gain_of_law(mission: &str, gain: &str) -> Option<String> {
+    let root: toml::Table = mission.parse().ok()?;
+    let coordination = root.get("coordination")?.as_table()?;
+    let (law, gains) = coordination.get("law")?.as_table()?.iter().next()?;
+    let known = gains.as_table()?.contains_key(gain) && !coordination.contains_key(gain);
+    known.then(|| format!("coordination.law.{law}.{gain}"))
 }
 
 /// Keys for which a number alone says enough: the loss of single messages, and a delay that is always the same.
@@ -141,6 +157,17 @@ mod tests {
         assert_eq!(Setting::parse("network.loss=0.3").expect("one").key, "network.loss.bernoulli.probability");
         assert_eq!(Setting::parse("network.delay=0:5:1").expect("five").key, "network.delay.constant.delay_s");
         assert_eq!(Setting::parse("network.loss=none").expect("one").key, "network.loss");
+    }
+
+    #[test]
+    fn a_gain_needs_no_law() {
+        let mission = "[coordination]\nvalidity_s = 1.0\nlaw = { switching = { gain = 0.1 } }\n";
+        let of = |key: &str| Setting::parse(&format!("{key}=1")).expect("one").of(mission).key;
+        assert_eq!(of("coordination.gain"), "coordination.law.switching.gain");
+        for whole in ["coordination.validity_s", "coordination.law.switching.gain", "coordination.b0", "gain"] {
+            assert_eq!(of(whole), whole);
+        }
+        assert_eq!(Setting::parse("coordination.gain=1").expect("one").of("no mission").key, "coordination.gain");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::measure::{MEASURES, index_of};
 use super::plan::Plan;
 use super::setting::Setting;
-use super::{Swept, page, picture, sweep};
+use super::{Swept, finding, page, picture, sweep};
 use crate::folder::{load, write};
 
 /// A study as written.
@@ -103,6 +103,9 @@ impl Study {
         if let Some(over) = self.over {
             let ids = self.file.sweeps.iter().map(|section| section.id.as_str());
             let sweeps: Vec<_> = ids.zip(all.iter().map(|swept| swept.cells.as_slice())).collect();
+            if let Some(found) = finding::against(&sweeps, self.measure, over) {
+                let _ = writeln!(page, "**{found}**\n");
+            }
             if let Some(svg) = picture::against(&sweeps, self.measure, over, "study") {
                 write(&out.join("study.svg"), svg.as_bytes())?;
                 let _ =
@@ -111,6 +114,9 @@ impl Study {
         }
         for ((section, plan), swept) in self.file.sweeps.iter().zip(&self.plans).zip(&all) {
             let _ = writeln!(page, "## {}\n", section.id);
+            if let Some(found) = finding::of_sweep(plan, &swept.cells, self.measure) {
+                let _ = writeln!(page, "**{found}**\n");
+            }
             let name = format!("{}.svg", section.id);
             let svg = picture::picture(plan, &swept.cells, self.measure, &section.id);
             if let Some(svg) = &svg {

@@ -43,8 +43,8 @@ fn figure_2_8() -> Figure {
         x: "real part [rad/s]".into(),
         y: "imaginary part [rad/s]".into(),
         curves: vec![
-            Curve::dots(format!("λ_p < {critical:.3}"), locus(critical - 0.5, critical)),
-            Curve::dots(format!("λ_p > {critical:.3}"), locus(critical, critical + 2.0)),
+            Curve::dots(format!("λₚ < {critical:.3}"), locus(critical - 0.5, critical)),
+            Curve::dots(format!("λₚ > {critical:.3}"), locus(critical, critical + 2.0)),
             Curve::line("", vec![(0.0, -1.5), (0.0, 1.5)]),
         ],
     }
@@ -99,7 +99,7 @@ fn loss_rate(mission: &Mission, network: &Network) -> Option<Figure> {
             ),
             x: "α".into(),
             y: "rate [1/s]".into(),
-            curves: vec![Curve::line("(1 − α) k_m λ_m", promised), Curve::dots("this mission", vec![here])],
+            curves: vec![Curve::line("(1 − α) kₘ λₘ", promised), Curve::dots("this mission", vec![here])],
         }
         .draw(),
     )
