@@ -373,8 +373,11 @@ mod tests {
         }
         logs.close();
         let earlier = logs.folder_of(mission().digest).join("earlier");
-        let mut names: Vec<_> =
-            fs::read_dir(earlier).expect("there").flatten().map(|e| e.file_name().into_string().expect("text")).collect();
+        let mut names: Vec<_> = fs::read_dir(earlier)
+            .expect("there")
+            .flatten()
+            .map(|e| e.file_name().into_string().expect("text"))
+            .collect();
         names.sort();
         assert_eq!(names, ["hub.4.mcap", "hub.5.mcap", "hub.6.mcap", "hub.7.mcap", "hub.8.mcap"]);
     }

@@ -188,7 +188,8 @@ struct RunArgs {
     /// The run folder (default: runs/MISSION-TIME)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Fly with a fleet that is already up, at this endpoint (default: tcp/127.0.0.1:7447)
+    /// Fly with a fleet that is already up, at this endpoint (default: tcp/127.0.0.1:7447). One run at a time conducts it:
+    /// another is queued for 2.5 s and flies if its turn comes, else it gives up
     #[arg(long, value_name = "tcp/HOST:PORT", num_args = 0..=1, default_missing_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
     attach: Option<Endpoint>,
     /// Where the own network-emulator listens (default: tcp/127.0.0.1:7447, or a free port if that is taken)

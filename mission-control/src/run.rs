@@ -10,12 +10,12 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bus::{Plane, Refusal};
 use bus::console::StopFlag;
 use bus::drive::{Clock, Next, Port, Program, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::recording::{Merged, merge};
 use bus::setup::Endpoint;
+use bus::{Plane, Refusal};
 use common::mission::Mission;
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
@@ -97,7 +97,12 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     };
     let mut config = LineConfig::new(endpoint.clone(), COLLECTOR);
     config.patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
-    let (line, events) = Line::connect(config).map_err(|error| Failure::Unreachable(error.to_string()))?;
+    let (line, events) = Line::connect(config).map_err(|error| match error {
+        bus::Error::Refused(refusal @ Refusal::Taken { .. }) => Failure::Unreachable(format!(
+            "{refusal} to this fleet: another run conducts it. Wait until that is over, or end it with: mission-control stop"
+        )),
+        error => Failure::Unreachable(error.to_string()),
+    })?;
     stop.arm();
     // A fleet that cannot be reached leaves no folder behind.
     let folder = folder.map_or_else(make_folder, Ok)?;
@@ -402,8 +407,8 @@ impl ConductPort<'_> {
         };
         let [sent, delivered, dropped, _] = status.messages;
         let message = match step {
-            Step::Contact => String::new(),
-            Step::Arming | Step::Starting => not_armed(&self.mission, status),
+            Step::Contact | Step::Starting => String::new(),
+            Step::Arming => not_armed(&self.mission, status),
             _ => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{}", self.away(status)),
         };
         // The time of a mission that the fleet flew before is none of this one's.
@@ -417,7 +422,8 @@ impl ConductPort<'_> {
         let (lost, awaited): (Vec<&str>, Vec<&str>) =
             away.partition(|id| self.own && !self.processes.running.contains_key(*id));
         let lost = lost.iter().map(|id| format!("; {id} is lost")).collect::<String>();
-        let awaited = if awaited.is_empty() { awaited.concat() } else { format!("; waiting for {}", awaited.join(", ")) };
+        let awaited =
+            if awaited.is_empty() { awaited.concat() } else { format!("; waiting for {}", awaited.join(", ")) };
         lost + &awaited
     }
 
@@ -441,12 +447,6 @@ impl Port for ConductPort<'_> {
         match event {
             LineEvent::Connected => Some((None, ConductInput::Connected)),
             LineEvent::Lost => Some((None, ConductInput::Lost)),
-            LineEvent::Refused(refusal @ Refusal::Taken { .. }) => {
-                self.progress.line(&format!(
-                    "{refusal} to this fleet: another run conducts it. This one is queued, and goes on when that one has ended"
-                ));
-                None
-            }
             LineEvent::Refused(refusal) => {
                 self.progress.line(&refusal.to_string());
                 None
@@ -501,7 +501,12 @@ impl Port for ConductPort<'_> {
         if self.own && !self.processes.running.contains_key(HUB) {
             // Nobody will start it again; what was recorded is worth a report.
             self.progress.line("the network-emulator has ended, and the flight with it");
-            return Next::Exit(Ok(Landing { phase: Phase::Aborted, pace: None, missing: Vec::new(), aborted: Vec::new() }));
+            return Next::Exit(Ok(Landing {
+                phase: Phase::Aborted,
+                pace: None,
+                missing: Vec::new(),
+                aborted: Vec::new(),
+            }));
         }
         if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended.is_empty() {
             let ended = self.processes.ended.join(", ");

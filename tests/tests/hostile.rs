@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::mpsc;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bus::queue::Events;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
@@ -142,6 +142,9 @@ fn garbage(number: u64, mission: &Mission) -> Vec<u8> {
     }
 }
 
+/// Zenoh's threads belong to the whole process: a flood in one test would hold up the other.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// Resident memory of a process \[KiB\].
 fn resident_kib(process: &Process) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).expect("it lives");
@@ -151,6 +154,7 @@ fn resident_kib(process: &Process) -> u64 {
 
 #[test]
 fn whatever_one_vehicle_says_the_others_fly_on_and_agree() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let ground = Ground::new();
     let text = mission_text(MISSION);
     ground.file("mission.toml", &text);
@@ -214,7 +218,10 @@ fn whatever_one_vehicle_says_the_others_fly_on_and_agree() {
         .iter()
         .filter_map(|note| note["text"].as_str().filter(|text| text.starts_with("first message ignored from c")))
         .collect();
-    assert!(first.len() >= 4 && first.iter().collect::<std::collections::BTreeSet<_>>().len() == first.len(), "{first:?}");
+    assert!(
+        first.len() >= 4 && first.iter().collect::<std::collections::BTreeSet<_>>().len() == first.len(),
+        "{first:?}"
+    );
     assert_eq!((counted("ignored", "a"), counted("ignored", "b")), (0, 0), "{notes:?}");
     let recording = ground.recording("run");
     let apart = apart_at_last(&recording.exact, "a", "b");
@@ -248,7 +255,9 @@ impl HostileHub {
     fn hears(&self, what: &str, is_such: impl Fn(&FromVehicle) -> bool) {
         until(PATIENCE, what, || {
             std::iter::from_fn(|| self.events.pop()).any(|event| match event {
-                HubEvent::Packet { plane: Plane::Mission, bytes, .. } => decode(&bytes).is_ok_and(|said| is_such(&said)),
+                HubEvent::Packet { plane: Plane::Mission, bytes, .. } => {
+                    decode(&bytes).is_ok_and(|said| is_such(&said))
+                }
                 _ => false,
             })
         });
@@ -257,6 +266,7 @@ impl HostileHub {
 
 #[test]
 fn garbage_costs_a_vehicle_no_memory_and_one_line_of_each_kind() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let ground = Ground::new();
     let text = mission_text(MISSION);
     let plan = mission(&text);

@@ -431,7 +431,10 @@ mod tests {
         assert!(opens_afresh(&started(&mut node, ClockPlan::Stepped, long_after)));
         node.handle(long_after, Some(NodeInput::LogOpened { last: None }));
         let said = outputs(&mut node);
-        assert!(said.iter().any(|output| matches!(output, NodeOutput::Say(text) if text == "flying auv-helix")), "{said:?}");
+        assert!(
+            said.iter().any(|output| matches!(output, NodeOutput::Say(text) if text == "flying auv-helix")),
+            "{said:?}"
+        );
         let until = Time::from_secs(1.0);
         node.handle(long_after, Some(NodeInput::Message(ToVehicle::Grant { until, heard: vec![], speeds: vec![] })));
         let first = outputs(&mut node).into_iter().find_map(|output| match output {

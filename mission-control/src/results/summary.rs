@@ -266,8 +266,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         connectivity: network.connectivity(facts),
         coordination: coordination_summary(&coordination, facts),
     };
-    let complete =
-        recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);
+    let complete = recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);
     let mut known = facts.aborted.clone();
     known.extend_from_slice(&facts.missing);
     known.extend(warnings(recording, &vehicles, &links));
