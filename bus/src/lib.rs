@@ -32,5 +32,5 @@ mod outbox;
 
 pub use counts::Counts;
 pub use error::{Error, Result};
-pub use lobby::{PROTOCOL_VERSION, Refusal};
+pub use lobby::{PROTOCOL_VERSION, Refusal, check_id};
 pub use plane::Plane;

@@ -283,7 +283,7 @@ impl Keeper {
                     if taken_since.get_or_insert_with(Instant::now).elapsed() > GHOST {
                         return Err(Error::Refused(refusal));
                     }
-                    refusal.to_string()
+                    format!("{refusal}: queued for its place, for {:.1} s at most", GHOST.as_secs_f64())
                 }
                 Err(Setback::Refused(refusal)) => return Err(Error::Refused(refusal)),
                 Err(Setback::Absent(why)) => {

@@ -86,7 +86,10 @@ impl Refusal {
 }
 
 /// Accepts 1 to 32 of `a-z 0-9 - _`.
-pub(crate) fn check_id(id: &str) -> Result<(), Refusal> {
+///
+/// # Errors
+/// The refusal that the hub would answer.
+pub fn check_id(id: &str) -> Result<(), Refusal> {
     let fits = (1..=LONGEST_ID).contains(&id.len())
         && id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_');
     if fits { Ok(()) } else { Err(Refusal::BadId { id: id.into() }) }

@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use common::mission::Mission;
 use common::record::{ClockRecord, Name, NoteRow, Record, Row, Settled, StateRow};
+use common::time::Time;
 use common::wire::vehicle::LogPiece;
 
 use crate::recording::packed::{PACK, Pack};
@@ -22,10 +23,21 @@ const QUEUE: usize = 256;
 const HELPING: usize = 64;
 /// Bytes of a log sent at a time.
 const PIECE: usize = 512 << 10;
+/// Logs of earlier flights of a mission that are kept, of each name: the newest.
+const KEPT: u64 = 5;
 
 /// Where a recording comes from.
 pub fn origin(mission: &Mission) -> Origin {
     Origin { mission_toml: mission.text.clone(), digest: format!("{:016x}", mission.digest), seed: mission.seed }
+}
+
+/// What earlier lives of a process recorded in a flight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Earlier {
+    /// Mission time of the newest row; none if there are no rows.
+    pub until: Option<Time>,
+    /// The newest state.
+    pub last_state: Option<StateRow>,
 }
 
 /// The logs of one process.
@@ -53,6 +65,8 @@ struct Open {
 enum Helping {
     Rows(Vec<Row>),
     Pack(Pack),
+    /// To the disk with all that came before.
+    Flush,
 }
 
 impl Open {
@@ -89,6 +103,19 @@ impl Logs {
         Logs { folder: folder.into(), stem: stem.to_string(), open: None, failure: Arc::default() }
     }
 
+    /// Writes a file where the logs are to be, and removes it: a process that cannot keep logs had better say so before
+    /// it is needed.
+    ///
+    /// # Errors
+    /// Why it cannot.
+    pub fn check(&self) -> Result<(), String> {
+        let trial = self.folder.join(format!(".{}-{}", self.stem, std::process::id()));
+        fs::create_dir_all(&self.folder)
+            .and_then(|()| fs::write(&trial, "\n"))
+            .and_then(|()| fs::remove_file(&trial))
+            .map_err(|error| format!("cannot keep logs in {}: {error}", self.folder.display()))
+    }
+
     fn folder_of(&self, digest: u64) -> PathBuf {
         self.folder.join(format!("{digest:016x}"))
     }
@@ -104,23 +131,23 @@ impl Logs {
     }
 
     /// Begins a log of this mission. If `fresh`, what earlier flights of the same mission left is set aside; otherwise it
-    /// is kept, and the last state in it is returned.
+    /// is kept, and its end is returned.
     ///
     /// # Errors
     /// Why the file cannot be made.
-    pub fn open(&mut self, mission: &Mission, fresh: bool) -> Result<Option<StateRow>, String> {
+    pub fn open(&mut self, mission: &Mission, fresh: bool) -> Result<Earlier, String> {
         self.close();
         let folder = self.folder_of(mission.digest);
         let refused = |error: &dyn std::fmt::Display| format!("cannot record in {}: {error}", folder.display());
         fs::create_dir_all(&folder).map_err(|error| refused(&error))?;
-        let earlier = self.files(mission.digest);
-        let mut last = None;
+        let files = self.files(mission.digest);
+        let mut earlier = Earlier::default();
         if fresh {
-            for file in &earlier {
+            for file in &files {
                 set_aside(file).map_err(|error| refused(&error))?;
             }
         } else {
-            last = earlier.iter().rev().find_map(|file| last_state(file));
+            earlier = ends_of(&files);
         }
         let (path, recorder) =
             Recorder::create_next(&folder, &self.stem, &origin(mission)).map_err(|error| refused(&error))?;
@@ -148,7 +175,7 @@ impl Logs {
             waits: 0,
             last_t_ns: 0,
         });
-        Ok(last)
+        Ok(earlier)
     }
 
     /// Records a row, if a log is open. It is handed to the disk with others, or with the next [`tend`](Logs::tend).
@@ -157,9 +184,14 @@ impl Logs {
             // What is in the pack came before it.
             open.hand_over_pack();
             open.last_t_ns = time_of(&row);
+            // A command cannot be told again by who is killed a moment later.
+            let commanded = matches!(row, Row::Exact(Record::Speed(_)));
             open.rows.push(row);
-            if open.rows.len() >= HELPING {
+            if open.rows.len() >= HELPING || commanded {
                 open.hand_over_rows();
+            }
+            if commanded {
+                open.hand_over(Helping::Flush);
             }
         }
     }
@@ -235,6 +267,7 @@ fn write_rows(
         match queue.recv_timeout(FLUSH_PERIOD) {
             Ok(Helping::Rows(rows)) => rows.iter().try_for_each(|row| recorder.write(row)).map_err(broken)?,
             Ok(Helping::Pack(pack)) => recorder.write_pack(&pack, vehicles).map_err(broken)?,
+            Ok(Helping::Flush) => recorder.flush().map_err(broken)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 recorder.finish().map_err(broken)?;
@@ -245,13 +278,18 @@ fn write_rows(
     }
 }
 
-/// Moves a file into the folder `earlier` beside it, under a name that is free.
+/// Moves a file into the folder `earlier` beside it, with the next number, and removes the oldest of its name there.
 fn set_aside(file: &Path) -> std::io::Result<()> {
     let folder = file.with_file_name("earlier");
     fs::create_dir_all(&folder)?;
     let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let free = (1..).map(|n| folder.join(format!("{stem}.{n}.mcap"))).find(|path| !path.exists());
-    free.map_or(Ok(()), |path| fs::rename(file, path))
+    let path = |number: u64| folder.join(format!("{stem}.{number}.mcap"));
+    let number = |name: &str| name.strip_prefix(&format!("{stem}."))?.strip_suffix(".mcap")?.parse::<u64>().ok();
+    let names = fs::read_dir(&folder)?.flatten().map(|entry| entry.file_name());
+    let there: Vec<u64> = names.filter_map(|name| number(&name.to_string_lossy())).collect();
+    let next = there.iter().max().map_or(1, |newest| newest.saturating_add(1));
+    fs::rename(file, path(next))?;
+    there.into_iter().filter(|old| old.saturating_add(KEPT) <= next).try_for_each(|old| fs::remove_file(path(old)))
 }
 
 fn read_piece(path: &Path, offset: u64) -> std::io::Result<(u64, Vec<u8>)> {
@@ -263,12 +301,93 @@ fn read_piece(path: &Path, offset: u64) -> std::io::Result<(u64, Vec<u8>)> {
     Ok((size, bytes))
 }
 
-/// The last state that a log holds.
-fn last_state(path: &Path) -> Option<StateRow> {
-    let reader = RowReader::open(path).ok()?;
-    let states = reader.filter_map(|row| match row {
-        Ok(Row::Exact(Record::State(state))) => Some(state),
-        _ => None,
-    });
-    states.last()
+/// Where the logs of earlier lives end, looked for from the newest on.
+fn ends_of(files: &[PathBuf]) -> Earlier {
+    let mut earlier = Earlier::default();
+    for file in files.iter().rev() {
+        let Ok(reader) = RowReader::open(file) else { continue };
+        let mut last_state = None;
+        for row in reader.map_while(Result::ok) {
+            earlier.until = earlier.until.max(Some(Time::from_nanos(time_of(&row))));
+            if let Row::Exact(Record::State(state)) = row {
+                last_state = Some(state);
+            }
+        }
+        earlier.last_state = earlier.last_state.or(last_state);
+        if earlier.last_state.is_some() {
+            break;
+        }
+    }
+    earlier
+}
+
+#[cfg(test)]
+mod tests {
+    use common::record::SpeedRow;
+
+    use super::*;
+    use crate::recording::read;
+
+    const HELIX: &str = include_str!("../../missions/auv-helix.toml");
+
+    fn mission() -> Mission {
+        Mission::parse("m.toml", HELIX).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    fn speed(t_ns: i64) -> Row {
+        Row::Exact(Record::Speed(SpeedRow { t_ns, speed: 0.5 }))
+    }
+
+    #[test]
+    fn a_command_is_on_disk_at_once() {
+        let folder = tempfile::tempdir().expect("directory");
+        let mut logs = Logs::new(folder.path(), "hub");
+        logs.open(&mission(), true).expect("opens");
+        logs.write(speed(7));
+        let path = logs.folder_of(mission().digest).join("hub.mcap");
+        // The thread that writes is not asked to tend or close: a process that is killed does neither.
+        let deadline = Instant::now() + FLUSH_PERIOD * 20;
+        while read(&path).is_ok_and(|recording| recording.exact.is_empty()) {
+            assert!(Instant::now() < deadline, "it stays in memory");
+            std::thread::yield_now();
+        }
+    }
+
+    #[test]
+    fn the_end_of_an_earlier_life_is_known() {
+        let folder = tempfile::tempdir().expect("directory");
+        let mut logs = Logs::new(folder.path(), "hub");
+        assert_eq!(logs.open(&mission(), true).expect("opens"), Earlier::default());
+        [3, 9, 5].map(speed).into_iter().for_each(|row| logs.write(row));
+        let earlier = logs.open(&mission(), false).expect("opens");
+        assert_eq!(earlier, Earlier { until: Some(Time::from_nanos(9)), last_state: None });
+        assert_eq!(logs.open(&mission(), true).expect("opens"), Earlier::default(), "it is set aside");
+    }
+
+    #[test]
+    fn the_newest_logs_of_earlier_flights_are_kept() {
+        let folder = tempfile::tempdir().expect("directory");
+        let mut logs = Logs::new(folder.path(), "hub");
+        for _ in 0..9 {
+            logs.open(&mission(), true).expect("opens");
+        }
+        logs.close();
+        let earlier = logs.folder_of(mission().digest).join("earlier");
+        let mut names: Vec<_> = fs::read_dir(earlier)
+            .expect("there")
+            .flatten()
+            .map(|e| e.file_name().into_string().expect("text"))
+            .collect();
+        names.sort();
+        assert_eq!(names, ["hub.4.mcap", "hub.5.mcap", "hub.6.mcap", "hub.7.mcap", "hub.8.mcap"]);
+    }
+
+    #[test]
+    fn a_folder_that_takes_no_files_is_told_beforehand() {
+        let folder = tempfile::tempdir().expect("directory");
+        assert_eq!(Logs::new(folder.path().join("new"), "hub").check(), Ok(()));
+        assert_eq!(fs::read_dir(folder.path().join("new")).expect("made").count(), 0, "nothing is left behind");
+        let refused = Logs::new("/proc/nope", "hub").check().expect_err("no files there");
+        assert!(refused.starts_with("cannot keep logs in /proc/nope: "), "{refused}");
+    }
 }

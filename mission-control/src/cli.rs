@@ -26,8 +26,8 @@ use crate::{folder, operator, rehearse, theory, waypoints, worst};
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
 /// over an emulated network, and reports on it.
 ///
-/// Exit codes: 0 all is well, 1 the flight was aborted or two runs differ, 2 a wrong mission or command, 3 the fleet
-/// cannot be reached, 4 files cannot be read or written.
+/// Exit codes: 0 all is well, 1 the flight or a vehicle of it was aborted or lost, or two runs differ, 2 a wrong mission
+/// or command, 3 the fleet cannot be reached, 4 files cannot be read or written.
 #[derive(Debug, Parser)]
 #[command(
     name = "mission-control",
@@ -189,7 +189,8 @@ struct RunArgs {
     /// The run folder (default: runs/MISSION-TIME)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Fly with a fleet that is already up, at this endpoint (default: tcp/127.0.0.1:7447)
+    /// Fly with a fleet that is already up, at this endpoint (default: tcp/127.0.0.1:7447). One run at a time conducts it:
+    /// another is queued for 2.5 s and flies if its turn comes, else it gives up
     #[arg(long, value_name = "tcp/HOST:PORT", num_args = 0..=1, default_missing_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
     attach: Option<Endpoint>,
     /// Where the own network-emulator listens (default: tcp/127.0.0.1:7447, or a free port if that is taken)
@@ -241,7 +242,7 @@ struct WorstArgs {
 
 #[derive(Debug, clap::Args)]
 struct FleetArgs {
-    /// The fleet's network-emulator
+    /// The fleet's network-emulator; given up when it is not found within 3 s, or does not answer within 5 s
     #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
     attach: Endpoint,
 }
@@ -390,7 +391,8 @@ fn simulate(path: &Path, out: Option<&Path>, sets: &[String], seed: Option<u64>,
     let mission = changed(load(path)?, sets, seed).map_err(|reason| End(2, reason))?;
     warn(&theory::rows(&mission, None));
     let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
-    tell(&mission, &folder, outcome.phase, &summary, &[], json)
+    let sound = outcome.phase == Phase::Finished && outcome.aborted.is_empty();
+    tell(&mission, &folder, outcome.phase, sound, &summary, json)
 }
 
 /// The mission with some of its keys at other values.
@@ -487,7 +489,7 @@ fn run_fleet(args: RunArgs) -> Ended {
         patience: args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64),
     };
     match fly(&plan) {
-        Ok(flown) => tell(&mission, &flown.folder, flown.phase, &flown.summary, &flown.missing, args.json),
+        Ok(flown) => tell(&mission, &flown.folder, flown.phase, flown.sound, &flown.summary, args.json),
         Err(Failure::Unreachable(reason)) => Err(End(3, reason)),
         Err(Failure::Refused(reason)) => Err(End(1, reason)),
         Err(Failure::Files(reason)) => Err(End(4, reason)),
@@ -499,9 +501,9 @@ fn run_fleet(args: RunArgs) -> Ended {
 }
 
 /// What came of a flight, for a person or a pipe.
-fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missing: &[String], json: bool) -> Ended {
-    // On standard error, so that a pipe gets the numbers alone; they are among the warnings there too.
-    for text in missing.iter().chain(&summary.warnings) {
+fn tell(mission: &Mission, folder: &Path, phase: Phase, sound: bool, summary: &Summary, json: bool) -> Ended {
+    // On standard error, so that a pipe gets the numbers alone; who gave up and what is missing is among them.
+    for text in &summary.warnings {
         bus::remark!("warning: {text}");
     }
     if json {
@@ -536,7 +538,7 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
         bus::tell!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
         bus::tell!("report: {}", folder.join("report.html").display());
     }
-    Ok(if phase == Phase::Finished { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn ask(endpoint: &Endpoint, question: &ToFleet) -> Result<FromFleet, End> {
@@ -607,7 +609,7 @@ fn gallery(missions: &Path, out: &Path) -> Ended {
 }
 
 fn report(run: &Path) -> Ended {
-    folder::report(run, Vec::new()).map_err(|error| End(4, error))?;
+    folder::report(run).map_err(|error| End(4, error))?;
     bus::tell!("report: {}", run.join("report.html").display());
     Ok(ExitCode::SUCCESS)
 }

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use common::machine::Machine;
 use common::mission::Mission;
 use common::time::{Span, Time};
-use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
+use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{LogPiece, Phase};
 use network_emulator::hub::HUB;
+use vehicle_node::node::STOPPED;
 
 /// Between two questions after the fleet's status.
 const POLL: Span = Span::from_nanos(200_000_000);
@@ -40,8 +41,15 @@ pub enum ConductOutput {
     Send(ToFleet),
     /// How it goes.
     Progress(Step, Option<FleetStatus>),
+    /// A line for people.
+    Remark(String),
     /// The flight is over, or was found to be; the logs are collected next.
-    Over(Phase),
+    Over {
+        /// How it ended.
+        phase: Phase,
+        /// Vehicles that gave up by themselves, and why.
+        aborted: Vec<String>,
+    },
     /// A piece of a log.
     Log {
         /// Whose.
@@ -51,14 +59,22 @@ pub enum ConductOutput {
     },
     /// Everything that could be collected is here; what could not is named, with the reason. The fleet is dismissed when it
     /// is on disk.
-    Done {
-        /// How the flight ended.
-        phase: Phase,
-        /// Logs that are missing: whose, and why.
-        missing: Vec<(String, String)>,
-    },
+    Done(Landing),
     /// It cannot be flown.
     Failed(String),
+}
+
+/// How a flight came to its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Landing {
+    /// Finished, or Aborted.
+    pub phase: Phase,
+    /// How mission time passed, if the fleet told.
+    pub pace: Option<Pace>,
+    /// Logs that are missing: whose, and why.
+    pub missing: Vec<(String, String)>,
+    /// Vehicles that gave up by themselves, and why.
+    pub aborted: Vec<String>,
 }
 
 /// Where a conducted flight is.
@@ -84,7 +100,11 @@ pub struct Conduct {
     step: Step,
     since: Time,
     next_poll: Time,
+    /// The mission was loaded: from here on, a flight of it that is over was ended before its start.
+    loaded: bool,
     ended: Phase,
+    flown: Option<Pace>,
+    aborted: Vec<String>,
     /// Whose logs are still to be had, the present one first.
     to_collect: VecDeque<Wanted>,
     missing: Vec<(String, String)>,
@@ -110,11 +130,19 @@ impl Conduct {
             step: Step::Contact,
             since: Time::ZERO,
             next_poll: Time::ZERO,
+            loaded: false,
             ended: Phase::Idle,
+            flown: None,
+            aborted: Vec::new(),
             to_collect: VecDeque::new(),
             missing: Vec::new(),
             outputs: VecDeque::new(),
         }
+    }
+
+    /// Where it is.
+    pub fn step(&self) -> Step {
+        self.step
     }
 
     fn send(&mut self, message: ToFleet) {
@@ -143,6 +171,9 @@ impl Conduct {
     fn status(&mut self, now: Time, status: FleetStatus) {
         self.outputs.push_back(ConductOutput::Progress(self.step, Some(status.clone())));
         let same = status.mission == self.mission.text;
+        if same {
+            self.flown = status.pace.or(self.flown);
+        }
         match self.step {
             Step::Contact if status.phase == Phase::Running && !same => {
                 let reason = "the fleet is flying another mission; stop it first (mission-control stop)";
@@ -151,18 +182,30 @@ impl Conduct {
             Step::Contact if status.phase == Phase::Running => self.enter(Step::Flying, now),
             // A flight of this mission ended while no mission-control was there to collect it.
             Step::Contact if self.collects && same && is_over(status.phase) && !status.collected => {
+                let remark = "collecting the flight that ended while nobody watched; run again to fly";
+                self.outputs.push_back(ConductOutput::Remark(remark.to_string()));
                 self.enter(Step::Flying, now);
                 self.flying(now, &status, true);
             }
             Step::Contact => {
                 let mission = self.mission.text.clone();
                 self.send(ToFleet::Upload { mission });
+                self.flown = None;
                 self.enter(Step::Arming, now);
             }
-            Step::Arming if same => self.arming(now, &status),
-            Step::Starting if same && status.phase == Phase::Running => self.enter(Step::Flying, now),
+            // A vehicle told a hub without memory of the flight that it is in.
+            Step::Arming | Step::Starting if same && status.phase == Phase::Running => self.enter(Step::Flying, now),
+            // An answer from before the mission was loaded speaks of the flight before.
+            Step::Arming if same && is_over(status.phase) && self.loaded => {
+                self.fail("stopped before the start".to_string());
+            }
+            Step::Arming if same => {
+                self.loaded |= status.phase == Phase::Armed;
+                self.arming(now, &status);
+            }
             Step::Starting if same && is_over(status.phase) => {
-                self.over(now, &status);
+                self.enter(Step::Flying, now);
+                self.flying(now, &status, same);
             }
             Step::Flying => self.flying(now, &status, same),
             _ => {}
@@ -218,7 +261,11 @@ impl Conduct {
 
     fn over(&mut self, now: Time, status: &FleetStatus) {
         self.ended = status.phase;
-        self.outputs.push_back(ConductOutput::Over(status.phase));
+        let gave_up = |v: &&VehicleStatus| self.concerns(&v.id) && v.phase == Phase::Aborted && v.reason != STOPPED;
+        let why = |reason: &str| if reason.is_empty() { "it gave no reason".to_string() } else { reason.to_string() };
+        self.aborted =
+            status.vehicles.iter().filter(gave_up).map(|v| format!("{} aborted: {}", v.id, why(&v.reason))).collect();
+        self.outputs.push_back(ConductOutput::Over { phase: status.phase, aborted: self.aborted.clone() });
         let wanted = |who: &str| Wanted { who: who.to_string(), file: 0, offset: 0, asked: None, tries: 0 };
         if self.collects {
             self.to_collect.push_back(wanted(HUB));
@@ -252,8 +299,12 @@ impl Conduct {
             self.missing.push((who, "it did not answer".to_string()));
         }
         self.step = Step::Ended;
-        let missing = std::mem::take(&mut self.missing);
-        self.outputs.push_back(ConductOutput::Done { phase: self.ended, missing });
+        self.outputs.push_back(ConductOutput::Done(Landing {
+            phase: self.ended,
+            pace: self.flown,
+            missing: std::mem::take(&mut self.missing),
+            aborted: std::mem::take(&mut self.aborted),
+        }));
     }
 
     fn log(&mut self, now: Time, who: &str, piece: LogPiece) {
@@ -324,8 +375,6 @@ impl Machine for Conduct {
 
 #[cfg(test)]
 mod tests {
-    use common::wire::fleet::VehicleStatus;
-
     use super::*;
 
     const HELIX: &str = include_str!("../../missions/auv-helix.toml");
@@ -346,6 +395,7 @@ mod tests {
             speed: 0.5,
             vehicles: ["auv1", "auv2", "auv3"].map(vehicle).into(),
             collected: false,
+            pace: matches!(phase, Phase::Running | Phase::Finished | Phase::Aborted).then_some(Pace::Stepped),
             messages: [0; 4],
         }
     }
@@ -374,8 +424,8 @@ mod tests {
         let said = hears(&mut conduct, 9.0, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Running)));
         assert_eq!(said, vec![], "a vehicle still flies");
         let said = hears(&mut conduct, 9.2, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Finished)));
-        assert_eq!(said[0], ConductOutput::Over(Phase::Finished));
-        assert!(matches!(said[1], ConductOutput::Done { phase: Phase::Finished, .. }));
+        assert_eq!(said[0], ConductOutput::Over { phase: Phase::Finished, aborted: vec![] });
+        assert!(matches!(&said[1], ConductOutput::Done(landing) if landing.phase == Phase::Finished));
         assert_eq!(conduct.poll_timeout(), None);
     }
 
@@ -387,6 +437,32 @@ mod tests {
         refusing.vehicles[1].reason = "no such path".into();
         let said = hears(&mut conduct, 0.1, FromFleet::Status(refusing));
         assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv2") && r.contains("no such path")));
+    }
+
+    #[test]
+    fn a_flight_that_is_stopped_before_its_start_fails() {
+        let mut conduct = conduct(true);
+        let collected = |phase| FleetStatus { collected: true, ..status(phase, HELIX, Phase::Aborted) };
+        hears(&mut conduct, 0.0, FromFleet::Status(collected(Phase::Aborted)));
+        // Said before the mission was loaded, heard after it was sent.
+        assert_eq!(hears(&mut conduct, 0.1, FromFleet::Status(collected(Phase::Aborted))), vec![]);
+        assert_eq!(hears(&mut conduct, 0.2, FromFleet::Status(status(Phase::Armed, HELIX, Phase::Idle))), vec![]);
+        let said = hears(&mut conduct, 0.3, FromFleet::Status(status(Phase::Aborted, HELIX, Phase::Aborted)));
+        assert_eq!(said, vec![ConductOutput::Failed("stopped before the start".into())]);
+        assert_eq!(conduct.poll_timeout(), None);
+    }
+
+    #[test]
+    fn who_gave_up_is_named_with_the_reason_and_who_was_stopped_is_not() {
+        let mut conduct = conduct(false);
+        hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Running, HELIX, Phase::Running)));
+        let mut over = status(Phase::Aborted, HELIX, Phase::Aborted);
+        for (vehicle, reason) in over.vehicles.iter_mut().zip(["it has diverged", STOPPED, ""]) {
+            vehicle.reason = reason.into();
+        }
+        let said = hears(&mut conduct, 1.0, FromFleet::Status(over));
+        let aborted = vec!["auv1 aborted: it has diverged".to_string(), "auv3 aborted: it gave no reason".to_string()];
+        assert_eq!(said[0], ConductOutput::Over { phase: Phase::Aborted, aborted });
     }
 
     #[test]
@@ -413,7 +489,10 @@ mod tests {
     fn a_flight_that_ended_unseen_is_collected_and_a_collected_one_is_flown_again() {
         let mut unseen = conduct(true);
         let said = hears(&mut unseen, 0.0, FromFleet::Status(status(Phase::Finished, HELIX, Phase::Finished)));
-        assert_eq!(said[0], ConductOutput::Over(Phase::Finished));
+        assert!(matches!(&said[0], ConductOutput::Remark(text) if text.contains("run again to fly")), "{said:?}");
+        assert_eq!(said[1], ConductOutput::Over { phase: Phase::Finished, aborted: vec![] });
+        // It is told how that one was flown, not how this one was to be.
+        assert_eq!(unseen.flown, Some(Pace::Stepped));
         let mut again = conduct(true);
         let collected = FleetStatus { collected: true, ..status(Phase::Finished, HELIX, Phase::Finished) };
         let said = hears(&mut again, 0.0, FromFleet::Status(collected));
@@ -450,8 +529,8 @@ mod tests {
             assert!(at < 60.0, "it gives up");
             conduct.handle(Time::from_secs(at), None);
             let outputs: Vec<_> = std::iter::from_fn(|| conduct.poll_output()).collect();
-            if let Some(ConductOutput::Done { missing, .. }) = outputs.last() {
-                break missing.clone();
+            if let Some(ConductOutput::Done(landing)) = outputs.last() {
+                break landing.missing.clone();
             }
         };
         assert_eq!(missing.iter().map(|(who, _)| who.as_str()).collect::<Vec<_>>(), ["auv2", "auv3"]);

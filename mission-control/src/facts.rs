@@ -2,6 +2,9 @@
 
 use common::mission::Mission;
 use common::mission::file::{LawChoice, MissionFile, ModelChoice, PathChoice, SwitchingChoice};
+use common::record::Record;
+use common::time::Time;
+use common::wire::vehicle::SpeedCommand;
 
 use crate::results::{Facts, VehicleFacts};
 use crate::theory;
@@ -9,8 +12,26 @@ use crate::theory;
 /// Points of a planned path in a figure.
 const PATH_POINTS: u32 = 300;
 
-/// The facts of a mission.
+/// The facts of a mission that is flown at the speeds of its file.
 pub fn facts(mission: &Mission) -> Facts {
+    facts_at(mission, mission.speed.at(mission.end).v_l)
+}
+
+/// The formation speed in force at an instant of a recorded flight. A command replaces what the file plans for later.
+pub fn speed_in_force(mission: &Mission, exact: &[Record], t: Time) -> f64 {
+    let rows = exact.iter().filter_map(|record| match record {
+        Record::Speed(row) => Some(SpeedCommand { at: Time::from_nanos(row.t_ns), speed: row.speed }),
+        _ => None,
+    });
+    let mut commands: Vec<SpeedCommand> = rows.filter(|row| !mission.speed.steps().contains(row)).collect();
+    commands.sort_by_key(|command| command.at);
+    let mut profile = mission.speed.clone();
+    commands.into_iter().for_each(|command| profile.command(command));
+    profile.at(t).v_l
+}
+
+/// The facts of a mission at whose end this formation speed was in force.
+pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
     // The mission was made from this text, so it can be read again.
     let file: Option<MissionFile> = toml::from_str(&mission.text).ok();
     let name = |i: usize| mission.vehicles[i].id.clone();
@@ -30,13 +51,14 @@ pub fn facts(mission: &Mission) -> Facts {
         }),
         guaranteed_rate: guarantee.map(|g| g.rate),
         guaranteed_factor: guarantee.and_then(|g| g.factor),
-        predicted_speed: mission
-            .excited_speed()
-            .or_else(|| Some(theory::speed_factor(mission)? * mission.speed.at(mission.end).v_l)),
+        formation_speed_at_the_end: Some(v_l),
+        predicted_speed: mission.excited_speed_at(v_l).or_else(|| Some(theory::speed_factor(mission)? * v_l)),
         predicted_along_bias_m: mission.predicted_along_bias(0),
         symbol: if is_chapter_4(mission) { "γ".to_string() } else { "ξ".to_string() },
         xi_unit: String::new(),
         spatial: mission.vehicles.iter().any(|v| matches!(v.model, ModelChoice::UnderactuatedAuv(_))),
+        missing: Vec::new(),
+        aborted: Vec::new(),
     }
 }
 
@@ -75,5 +97,38 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         path: path.to_string(),
         planned,
         message_bytes: Some(mission.message_bytes(index) as u64),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::record::SpeedRow;
+
+    #[test]
+    fn a_command_is_in_force_until_the_end_and_theory_speaks_of_it() {
+        let text = include_str!("../../missions/auv-helix.toml");
+        let mission = Mission::parse("m.toml", text).unwrap_or_else(|faults| panic!("{faults}"));
+        let row = |t_s: f64, speed| Record::Speed(SpeedRow { t_ns: Time::from_secs(t_s).nanos(), speed });
+        let rows = [row(0.0, 0.5), row(700.0, 0.4), row(300.0, 0.2)];
+        assert_eq!(speed_in_force(&mission, &rows, Time::from_secs(299.0)), 0.5);
+        assert_eq!(speed_in_force(&mission, &rows, mission.end), 0.4);
+        // v_L* = v_L/(1 + kτ) with kτ = 1/2.
+        let predicted = facts_at(&mission, 0.4).predicted_speed.expect("theory has a word on it");
+        assert!((predicted - 0.4 / 1.5).abs() < 1e-12, "{predicted}");
+        assert_eq!(facts(&mission).formation_speed_at_the_end, Some(0.5));
+    }
+
+    #[test]
+    fn a_command_replaces_what_the_file_plans_for_later() {
+        let text = include_str!("../../missions/auv-helix.toml");
+        let mut mission = Mission::parse("m.toml", text).unwrap_or_else(|faults| panic!("{faults}"));
+        let step = |at_s, speed| SpeedCommand { at: Time::from_secs(at_s), speed };
+        mission.speed = common::mission::SpeedProfile::new(vec![step(0.0, 0.5), step(500.0, 0.3)]);
+        let row = |t_s: f64, speed| Record::Speed(SpeedRow { t_ns: Time::from_secs(t_s).nanos(), speed });
+        let rows = [row(0.0, 0.5), row(500.0, 0.3)];
+        assert_eq!(speed_in_force(&mission, &rows, mission.end), 0.3);
+        let rows = [row(0.0, 0.5), row(500.0, 0.3), row(100.0, 0.1)];
+        assert_eq!(speed_in_force(&mission, &rows, mission.end), 0.1);
     }
 }

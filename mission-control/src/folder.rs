@@ -9,14 +9,17 @@ use std::time::SystemTime;
 use bus::recording::{Recording, read};
 use common::mission::Mission;
 use common::record::Record;
-use serde::Serialize;
+use common::time::Time;
+use serde::{Deserialize, Serialize};
 
-use crate::facts::facts;
+use crate::facts::{facts_at, speed_in_force};
 use crate::results::{Account, Summary, write_run_folder};
 use crate::theory;
 
 /// Names of the files in a run folder.
 pub const RECORDING: &str = "recording.mcap";
+/// What depends on the host and the time of day.
+const HOST: &str = "host.json";
 /// The mission file as flown.
 pub const MISSION: &str = "mission.toml";
 
@@ -72,12 +75,12 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
 }
 
 /// What a run was flown with: what depends on the host and the time of day, apart from what the seed determines.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct HostFacts {
     /// `simulate`, `run --stepped`, `run`, ...
     pub how: String,
     /// Version of mission-control.
-    pub version: &'static str,
+    pub version: String,
     /// The host's name.
     pub host: String,
     /// When the folder was written, UTC.
@@ -85,19 +88,24 @@ pub struct HostFacts {
     /// Seconds of wall clock the flight took.
     pub wall_s: f64,
     /// What is missing, and why.
+    #[serde(default)]
     pub missing: Vec<String>,
+    /// Vehicles that gave up, and why.
+    #[serde(default)]
+    pub aborted: Vec<String>,
 }
 
 impl HostFacts {
     /// Facts of now.
-    pub fn now(how: &str, wall_s: f64, missing: Vec<String>) -> HostFacts {
+    pub fn now(how: &str, wall_s: f64, missing: Vec<String>, aborted: Vec<String>) -> HostFacts {
         HostFacts {
             how: how.to_string(),
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").to_string(),
             host: bus::console::host_name(),
             written: utc_stamp(SystemTime::now()),
             wall_s,
             missing,
+            aborted,
         }
     }
 }
@@ -108,23 +116,27 @@ impl HostFacts {
 /// Which file is to blame, and why.
 pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
-    write(&folder.join("host.json"), &json)?;
-    let mut notes = vec![format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)];
-    notes.extend(host.missing.iter().map(|text| format!("Missing: {text}")));
-    report(folder, notes)
+    write(&folder.join(HOST), &json)?;
+    report(folder)
 }
 
 /// Writes summary, figures and report of the recording in a run folder, again if need be.
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn report(folder: &Path, notes: Vec<String>) -> Result<Summary, String> {
+pub fn report(folder: &Path) -> Result<Summary, String> {
     let recording = recording(folder)?;
     let mission = Mission::parse(MISSION, &recording.mission_toml).map_err(|faults| faults.to_string())?;
-    let mut facts = facts(&mission);
     // A flight that was ended early is measured over what was flown.
     let flown = recording.exact.iter().filter(|row| matches!(row, Record::State(_))).map(Record::t_ns).max();
-    facts.duration_s = flown.map_or(facts.duration_s, |t| (t as f64 / 1e9).min(facts.duration_s));
+    let end = flown.map_or(mission.end, |t_ns| Time::from_nanos(t_ns).min(mission.end));
+    let mut facts = facts_at(&mission, speed_in_force(&mission, &recording.exact, end));
+    facts.duration_s = end.secs();
+    // A recording by itself has no host facts beside it.
+    let host = fs::read(folder.join(HOST)).ok().and_then(|json| serde_json::from_slice::<HostFacts>(&json).ok());
+    let notes = host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written));
+    let notes = notes.collect();
+    (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
     let reproduce = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
     let account = Account { notes, reproduce };
     write_run_folder(folder, &recording, &facts, |summary| theory::rows(&mission, Some(summary)), &account)

@@ -27,7 +27,8 @@ pub fn rehearse(mission: &Arc<Mission>, out: Option<&Path>) -> Result<(PathBuf, 
     let outcome = record(mission, &path, |now| progress.reached("simulating", now, ""));
     progress.done();
     let outcome = outcome?;
-    let host = HostFacts::now("mission-control simulate", begun.elapsed().as_secs_f64(), Vec::new());
+    let host =
+        HostFacts::now("mission-control simulate", begun.elapsed().as_secs_f64(), Vec::new(), outcome.aborted.clone());
     let summary = folder::finish(&folder, &host)?;
     Ok((folder, outcome, summary))
 }

@@ -10,12 +10,12 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bus::Plane;
 use bus::console::StopFlag;
 use bus::drive::{Clock, Next, Port, Program, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::recording::{Merged, merge};
 use bus::setup::Endpoint;
+use bus::{Plane, Refusal};
 use common::mission::Mission;
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
@@ -24,7 +24,7 @@ use common::wire::{self, GarbageCount};
 use network_emulator::hub::{COLLECTOR, HUB};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::conduct::{Conduct, ConductInput, ConductOutput, Step};
+use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
 use crate::results::Summary;
@@ -56,10 +56,10 @@ pub struct Flown {
     pub folder: PathBuf,
     /// Finished, or Aborted.
     pub phase: Phase,
-    /// Its numbers.
+    /// Whether every vehicle flew to the end, and there are states of it up to there.
+    pub sound: bool,
+    /// Its numbers; what is missing is among its warnings.
     pub summary: Summary,
-    /// What is missing, and why.
-    pub missing: Vec<String>,
 }
 
 /// Why a flight came to nothing.
@@ -97,7 +97,12 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     };
     let mut config = LineConfig::new(endpoint.clone(), COLLECTOR);
     config.patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
-    let (line, events) = Line::connect(config).map_err(|error| Failure::Unreachable(error.to_string()))?;
+    let (line, events) = Line::connect(config).map_err(|error| match error {
+        bus::Error::Refused(refusal @ Refusal::Taken { .. }) => Failure::Unreachable(format!(
+            "{refusal} to this fleet: another run conducts it. Wait until that is over, or end it with: mission-control stop"
+        )),
+        error => Failure::Unreachable(error.to_string()),
+    })?;
     stop.arm();
     // A fleet that cannot be reached leaves no folder behind.
     let folder = folder.map_or_else(make_folder, Ok)?;
@@ -128,8 +133,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     } else {
         Some(line)
     };
-    let (phase, missing) = match exit {
-        Ok(ending) => ending,
+    let Landing { phase, pace, missing, aborted } = match exit {
+        Ok(landing) => landing,
         Err(failure) => {
             processes.terminate();
             processes.end();
@@ -156,21 +161,49 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     missing.extend(merged.damaged.iter().map(|(path, chunks, cause)| {
         format!("{chunks} damaged pieces of {} are left out; the first: {cause}", file_name(path))
     }));
-    missing.extend(late_beginnings(&plan.mission, plan.pace, &merged));
+    // A flight that was joined or only collected may have been started by someone else.
+    let pace = pace.unwrap_or(plan.pace);
+    missing.extend(late_beginnings(&plan.mission, pace, &merged));
+    let cut_short = cut_short(&plan.mission, phase, &merged);
+    let sound = phase == Phase::Finished && aborted.is_empty() && cut_short.is_empty();
+    missing.extend(cut_short.into_iter().filter(|(id, _)| !gave_up(&aborted, id)).map(|(_, text)| text));
     if let Some(line) = line {
         // What is on disk here need not be kept there.
         let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
         line.close();
         let _ = fs::remove_dir_all(&collected);
     }
-    let how = match (plan.pace, own) {
-        (Pace::Stepped, _) => "mission-control run --stepped",
-        (_, true) => "mission-control run",
-        (_, false) => "mission-control run --attach",
-    };
-    let host = HostFacts::now(how, begun.elapsed().as_secs_f64(), missing.clone());
+    let how = format!("mission-control run{}{}", if own { "" } else { " --attach" }, option(pace));
+    let host = HostFacts::now(&how, begun.elapsed().as_secs_f64(), missing, aborted);
     let summary = folder::finish(&folder, &host).map_err(Failure::Files)?;
-    Ok(Flown { folder, phase, summary, missing })
+    Ok(Flown { folder, phase, sound, summary })
+}
+
+/// The option with which `run` flies at this pace.
+fn option(pace: Pace) -> String {
+    match pace {
+        Pace::Stepped => " --stepped".to_string(),
+        Pace::Real { speed_up: 1.0 } => String::new(),
+        Pace::Real { speed_up } => format!(" --speed-up {speed_up}"),
+    }
+}
+
+/// Vehicles without states up to the end of the flight, in words: they were lost, or what they recorded was.
+fn cut_short(mission: &Mission, phase: Phase, merged: &Merged) -> Vec<(String, String)> {
+    let grace = mission.control_period * mission.record_ticks;
+    let of = |id: &str| match merged.spans.get(id) {
+        None => Some(format!("there are no states of {id}")),
+        Some((_, end)) if phase == Phase::Finished && Time::from_nanos(*end) + grace < mission.end => {
+            Some(format!("the states of {id} end at {}, before the flight did", Time::from_nanos(*end)))
+        }
+        Some(_) => None,
+    };
+    mission.vehicles.iter().filter_map(|vehicle| Some((vehicle.id.clone(), of(&vehicle.id)?))).collect()
+}
+
+/// Whether a vehicle is among those that gave up: its states end early, and that is told already.
+fn gave_up(aborted: &[String], id: &str) -> bool {
+    aborted.iter().any(|text| text.split(' ').next() == Some(id))
 }
 
 /// How late a vehicle may begin that did not begin in mid-flight \[s of wall clock\].
@@ -185,7 +218,8 @@ fn late_beginnings(mission: &Mission, pace: Pace, merged: &Merged) -> Vec<String
         }
         Pace::Stepped => Span::ZERO,
     };
-    let late = |id: &str| merged.begins.get(id).copied().filter(|begin| *begin > grace.nanos());
+    let begin = |id: &str| merged.spans.get(id).map(|(begin, _)| *begin);
+    let late = |id: &str| begin(id).filter(|begin| *begin > grace.nanos());
     let late = mission.vehicles.iter().filter_map(|vehicle| Some((&vehicle.id, late(&vehicle.id)?)));
     late.map(|(id, begin)| {
         let begin = Time::from_nanos(begin);
@@ -206,6 +240,24 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
     files.sort();
     files
+}
+
+/// Who is not armed yet, and why, in words.
+fn not_armed(mission: &Mission, status: &FleetStatus) -> String {
+    let of_mission = status.vehicles.iter().filter(|v| mission.index_of(&v.id).is_some());
+    let waiting: Vec<String> = of_mission
+        .filter(|v| !(v.connected && v.phase == Phase::Armed))
+        .map(|v| {
+            let why = match (v.connected, v.phase, v.reason.is_empty()) {
+                (false, ..) => "not connected",
+                (true, Phase::Running, _) => "still in another flight",
+                (true, _, false) => v.reason.as_str(),
+                (true, ..) => "has not answered yet",
+            };
+            format!("{} ({why})", v.id)
+        })
+        .collect();
+    if waiting.is_empty() { String::new() } else { format!("waiting for {}", waiting.join(", ")) }
 }
 
 // --- the processes of an own fleet -------------------------------------------------------------------------------------
@@ -339,7 +391,7 @@ struct ConductPort<'p> {
     garbage: GarbageCount,
 }
 
-type Ending = Result<(Phase, Vec<(String, String)>), Failure>;
+type Ending = Result<Landing, Failure>;
 
 impl ConductPort<'_> {
     fn tell(&mut self, step: Step, status: Option<&FleetStatus>) {
@@ -354,15 +406,25 @@ impl ConductPort<'_> {
             return self.progress.line("lost the network-emulator; looking for it");
         };
         let [sent, delivered, dropped, _] = status.messages;
-        let away: Vec<&str> = status.vehicles.iter().filter(|v| !v.connected).map(|v| v.id.as_str()).collect();
-        let away = if away.is_empty() { String::new() } else { format!("; waiting for {}", away.join(", ")) };
         let message = match step {
-            Step::Flying => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{away}"),
-            _ => away.trim_start_matches("; ").to_string(),
+            Step::Contact | Step::Starting => String::new(),
+            Step::Arming => not_armed(&self.mission, status),
+            _ => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{}", self.away(status)),
         };
         // The time of a mission that the fleet flew before is none of this one's.
         let now = if status.mission == self.mission.text { status.now } else { Time::ZERO };
         self.progress.reached(name, now, &message);
+    }
+
+    /// Who is not there, in words. Of own processes, none that has ended is started again.
+    fn away(&self, status: &FleetStatus) -> String {
+        let away = status.vehicles.iter().filter(|v| !v.connected).map(|v| v.id.as_str());
+        let (lost, awaited): (Vec<&str>, Vec<&str>) =
+            away.partition(|id| self.own && !self.processes.running.contains_key(*id));
+        let lost = lost.iter().map(|id| format!("; {id} is lost")).collect::<String>();
+        let awaited =
+            if awaited.is_empty() { awaited.concat() } else { format!("; waiting for {}", awaited.join(", ")) };
+        lost + &awaited
     }
 
     fn keep(&self, who: &str, piece: &LogPiece) -> Result<(), String> {
@@ -409,19 +471,20 @@ impl Port for ConductPort<'_> {
                 let _ = self.line.send(Plane::Mission, &wire::encode(&message));
             }
             ConductOutput::Progress(step, status) => self.tell(step, status.as_ref()),
-            ConductOutput::Over(_) => {}
+            ConductOutput::Remark(text) => self.progress.line(&text),
+            ConductOutput::Over { .. } => {}
             ConductOutput::Log { who, piece } => {
                 if let Err(error) = self.keep(&who, &piece) {
                     return Next::Exit(Err(Failure::Files(error)));
                 }
             }
-            ConductOutput::Done { phase, missing } => return Next::Exit(Ok((phase, missing))),
+            ConductOutput::Done(landing) => return Next::Exit(Ok(landing)),
             ConductOutput::Failed(reason) => return Next::Exit(Err(Failure::Refused(reason))),
         }
         Next::Go
     }
 
-    fn tend(&mut self, _conduct: &Conduct) -> Next<Self> {
+    fn tend(&mut self, conduct: &Conduct) -> Next<Self> {
         for news in self.processes.look() {
             self.progress.line(&news);
         }
@@ -438,7 +501,16 @@ impl Port for ConductPort<'_> {
         if self.own && !self.processes.running.contains_key(HUB) {
             // Nobody will start it again; what was recorded is worth a report.
             self.progress.line("the network-emulator has ended, and the flight with it");
-            return Next::Exit(Ok((Phase::Aborted, Vec::new())));
+            return Next::Exit(Ok(Landing {
+                phase: Phase::Aborted,
+                pace: None,
+                missing: Vec::new(),
+                aborted: Vec::new(),
+            }));
+        }
+        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended.is_empty() {
+            let ended = self.processes.ended.join(", ");
+            return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
         }
         Next::Go
     }

@@ -27,6 +27,8 @@ pub struct Outcome {
     pub now: Time,
     /// Sent, delivered, dropped and in flight, over all links.
     pub messages: [u64; 4],
+    /// Vehicles that gave up, and why.
+    pub aborted: Vec<String>,
 }
 
 /// What happens next, and to whom.
@@ -44,7 +46,7 @@ struct Fleet<'m> {
     conduct: Conduct,
     events: VecDeque<Event>,
     now: Time,
-    outcome: Option<Result<Phase, String>>,
+    outcome: Option<Result<(Phase, Vec<String>), String>>,
 }
 
 /// Flies a mission from its start to its end. Every row goes to `record` as it happens; `progress` is told the
@@ -98,7 +100,8 @@ pub fn simulate_with(
                 }
             }
             if let Some(outcome) = fleet.outcome.take() {
-                return Ok(Outcome { phase: outcome?, now: fleet.now, messages: fleet.hub.totals() });
+                let (phase, aborted) = outcome?;
+                return Ok(Outcome { phase, now: fleet.now, messages: fleet.hub.totals(), aborted });
             }
         }
         // All is quiet: mission-control asks how it stands.
@@ -182,10 +185,10 @@ impl Fleet<'_> {
                     // Answered at once, as the loop of the processes does.
                     self.nodes[index].handle(self.now, Some(NodeInput::LogOpened { last: None }));
                 }
+                NodeOutput::FollowClock(_) => self.nodes[index].handle(self.now, Some(NodeInput::ClockStarted)),
                 NodeOutput::Transmit(_)
                 | NodeOutput::Dismissed
                 | NodeOutput::CloseLog
-                | NodeOutput::FollowClock(_)
                 | NodeOutput::ReadLog { .. }
                 | NodeOutput::Say(_) => {}
             }
@@ -196,9 +199,12 @@ impl Fleet<'_> {
         while let Some(output) = self.conduct.poll_output() {
             match output {
                 ConductOutput::Send(message) => self.events.push_back(Event::Hub(from_control(message))),
-                ConductOutput::Over(phase) => self.outcome = Some(Ok(phase)),
+                ConductOutput::Over { phase, aborted } => self.outcome = Some(Ok((phase, aborted))),
                 ConductOutput::Failed(reason) => self.outcome = Some(Err(reason)),
-                ConductOutput::Progress(..) | ConductOutput::Log { .. } | ConductOutput::Done { .. } => {}
+                ConductOutput::Progress(..)
+                | ConductOutput::Remark(_)
+                | ConductOutput::Log { .. }
+                | ConductOutput::Done { .. } => {}
             }
         }
     }

@@ -44,14 +44,14 @@ const OVERRUN_PERIOD: Duration = Duration::from_secs(1);
 /// Every vehicle and mission-control connects here; no broker is needed beside it. It prints the endpoint it listens on
 /// as the first line of its output.
 ///
-/// Exit codes: 0 ended as asked, 2 wrong use, 3 cannot listen, 4 recording failed.
+/// Exit codes: 0 ended as asked, 2 wrong use, 3 cannot listen, 4 no logs can be kept, or recording failed.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "network-emulator", version)]
 pub struct Args {
     /// Where vehicles and mission-control connect; port 0 takes a free one
     #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_LISTEN")]
     pub listen: Endpoint,
-    /// Folder for the emulator's logs
+    /// Folder for the emulator's logs; of earlier flights of a mission it keeps the newest five
     #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
     pub logs: PathBuf,
     /// End when mission-control has collected the logs of a flight, or when nothing has been flown for ten minutes
@@ -64,6 +64,11 @@ pub struct Args {
 
 /// Runs the program to its end.
 pub fn run(args: Args) -> ExitCode {
+    let logs = Logs::new(&args.logs, HUB);
+    if let Err(reason) = logs.check() {
+        tracing::error!("{reason}");
+        return ExitCode::from(4);
+    }
     let (switchboard, events) = match open(&args.listen) {
         Ok(open) => open,
         Err(error) => {
@@ -77,7 +82,7 @@ pub fn run(args: Args) -> ExitCode {
     tracing::info!("network-emulator listens on {}", switchboard.endpoint());
     let port = HubPort {
         switchboard,
-        logs: Logs::new(&args.logs, HUB),
+        logs,
         lines: HashMap::new(),
         ids: BTreeMap::new(),
         seats: Vec::new(),
@@ -295,11 +300,14 @@ impl Port for HubPort {
             HubOutput::CloseLog => self.logs.close(),
             HubOutput::Say(text) => tracing::info!("{text}"),
             HubOutput::OpenLog { mission, fresh } => {
-                if let Err(reason) = self.logs.open(&mission.0, fresh) {
-                    tracing::error!("{reason}");
-                    self.recording_failed = Some(reason.clone());
-                    return Next::Feed(HubInput::LogFailed(reason));
-                }
+                return Next::Feed(match self.logs.open(&mission.0, fresh) {
+                    Ok(earlier) => HubInput::LogOpened { last: earlier.until },
+                    Err(reason) => {
+                        tracing::error!("{reason}");
+                        self.recording_failed = Some(reason.clone());
+                        HubInput::LogFailed(reason)
+                    }
+                });
             }
             HubOutput::StartClock(pace) => {
                 let plan = match pace {

@@ -164,6 +164,16 @@ fn a_fleet_flies_on_without_its_emulator_and_takes_it_back() {
     }
     let notes = fleet.notes("run");
     assert!(notes.contains("the emulator came back at"), "{notes}");
+    // While it was away nobody heard anybody: every link was down, which is measured as such.
+    let summary = fleet.ground.json("run/summary.json");
+    assert!(summary["fleet"]["connectivity"]["alpha"].as_f64() > Some(0.0), "{}", summary["fleet"]["connectivity"]);
+    for link in summary["links"].as_array().expect("links") {
+        assert!(link["up_fraction"].as_f64() < Some(1.0) && link["longest_outage_s"].as_f64() > Some(0.5), "{link}");
+    }
+    // Its first life was cut off: that is told, and harms no vehicle.
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("network-emulator-1.mcap ends in the middle"), "{warnings}");
+    assert_eq!(summary["complete"], false);
     let report = fs::read_to_string(fleet.ground.path("run/report.html")).expect("a report");
     assert!(report.contains("the emulator came back at"), "the report tells of it");
 }
@@ -213,6 +223,103 @@ fn the_formation_speed_changes_under_way_and_stop_ends_the_flight() {
         refused.ends_with(1);
         assert!(refused.stderr().starts_with("no flight is under way"), "{}", refused.stderr());
     }
+}
+
+#[test]
+fn a_speed_command_outlives_the_emulator_that_took_it() {
+    let mut fleet = Fleet::under_way(3000.0);
+    fleet.ground.controlled(0, &["speed", "0.8", "--attach", &fleet.endpoint]);
+    fleet.emulator.kill();
+    let (emulator, _) = fleet.ground.emulator(&fleet.endpoint);
+    fleet.emulator = emulator;
+    let everyone = |status: &Value| status["phase"] == "running" && IDS.iter().all(|id| is_flying(status, id));
+    let status = fleet.status_until("everyone is back", everyone);
+    fleet.status_until("the speed is in force", |later| now(later) > now(&status) + 20.0 && later["speed"] == 0.8);
+    fleet.stop();
+    let recording = fleet.ground.recording("run");
+    let speeds: Vec<f64> = recording
+        .exact
+        .iter()
+        .filter_map(|record| match record {
+            common::record::Record::Speed(row) => Some(row.speed),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(speeds, [0.5, 0.8], "each is there, and once");
+    let summary = &fleet.ground.json("run/summary.json")["fleet"];
+    assert_eq!(summary["formation_speed_at_the_end"], 0.8);
+    // Theory speaks of the speed that was commanded, not of the file's.
+    assert_eq!(summary["predicted_speed"], 0.8);
+}
+
+#[test]
+fn a_flight_that_ended_unwatched_is_collected_and_called_so() {
+    let mut fleet = Fleet::under_way(3000.0);
+    fleet.control.terminate();
+    fleet.control.ends_with(0);
+    assert!(fleet.control.stderr().contains("the fleet flies on"), "{}", fleet.control.stderr());
+    fleet.ground.controlled(0, &["stop", "--attach", &fleet.endpoint]);
+    let run = ["run", "mission.toml", "--attach", &fleet.endpoint, "--stepped", "--out", "second"];
+    let mut second = fleet.ground.control(&run);
+    second.ends_with(1);
+    let said = second.stderr();
+    assert!(said.contains("ended while nobody watched; run again to fly"), "{said}");
+    assert_eq!(fleet.ground.json("second/host.json")["how"], "mission-control run --attach --speed-up 10");
+}
+
+#[test]
+fn a_flight_that_is_stopped_while_it_waits_for_a_vehicle_ends() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text(MISSION));
+    let (_emulator, endpoint) = ground.emulator("tcp/127.0.0.1:0");
+    let _vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
+    let mut control = conduct(&ground, &endpoint, "run");
+    until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+    // Another one of its kind waits behind it for a while, and says so.
+    let mut queued = conduct(&ground, &endpoint, "queued");
+    queued.ends_with(3);
+    let said = queued.stderr();
+    assert!(said.contains("queued for its place") && said.contains("another run conducts it"), "{said}");
+    ground.status_until(&endpoint, "both are armed", |status| {
+        ["a", "b"].iter().all(|id| of_vehicle(status, id)["phase"] == "armed")
+    });
+    ground.controlled(0, &["stop", "--attach", &endpoint]);
+    control.ends_with(1);
+    assert!(control.stderr().contains("stopped before the start"), "{}", control.stderr());
+}
+
+/// At a formation speed that no robot can fly, all three diverge within a second or two.
+const WILD: &str = "missions/thesis/fig-3-7.toml";
+
+#[test]
+fn a_flight_in_which_every_vehicle_gives_up_ends_and_says_why() {
+    let ground = Ground::new();
+    ground.file("wild.toml", &with(&mission_text(WILD), "[formation]\nspeed = 0.1", "[formation]\nspeed = 1e6"));
+    let real = ["run", "wild.toml", "--speed-up", "1", "--listen", "tcp/127.0.0.1:0", "--out", "real"];
+    let stepped = ["run", "wild.toml", "--stepped", "--listen", "tcp/127.0.0.1:0", "--out", "stepped"];
+    let simulated = ["simulate", "wild.toml", "--out", "simulated"];
+    for (arguments, out, who) in [
+        (&real[..], "real", &["r1", "r2", "r3"][..]),
+        (&stepped, "stepped", &["r1"]),
+        (&simulated, "simulated", &["r1"]),
+    ] {
+        let mut control = ground.control(arguments);
+        control.ends_with(1);
+        let (said, summary) = (control.stderr(), ground.json(&format!("{out}/summary.json")));
+        assert!(summary["duration_s"].as_f64() < Some(20.0), "it did not fly on without vehicles: {summary}");
+        for id in who {
+            let reason = format!("{id} aborted: the vehicle's state is no longer a number, at 1.");
+            assert!(said.contains(&format!("warning: {reason}")), "{said}");
+            assert!(summary["warnings"].to_string().contains(&reason), "{}", summary["warnings"]);
+        }
+    }
+    for file in ["summary.json", "recording.mcap"] {
+        cpf_tests::assert_same_file(&ground.path("stepped").join(file), &ground.path("simulated").join(file));
+    }
+    // Making the report again forgets nothing of it.
+    let before = ground.json("real/summary.json");
+    ground.controlled(0, &["report", "real"]);
+    assert_eq!(ground.json("real/summary.json"), before);
 }
 
 #[test]
@@ -269,19 +376,45 @@ fn the_terminals_interrupt_ends_an_own_flight_with_its_report() {
     assert_reported(&ground);
 }
 
+/// Kill -9 for the process of an own flight that was started with this word.
+fn kill_own(control: &Process, word: &str) {
+    let id = control.id();
+    let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux");
+    let is_meant = |pid: &&str| {
+        fs::read_to_string(format!("/proc/{pid}/cmdline")).is_ok_and(|words| words.split('\0').any(|one| one == word))
+    };
+    let meant = children.split_whitespace().find(is_meant).expect("it runs").parse().expect("a number");
+    kill_process(Pid::from_raw(meant).expect("a process"), Signal::KILL).expect("it is there");
+}
+
 #[test]
 fn an_own_flight_ends_with_its_report_when_its_emulator_dies() {
     let ground = Ground::new();
     let mut control = own_flight(&ground);
-    let id = control.id();
-    let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux");
-    let is_emulator = |pid: &&str| {
-        fs::read_to_string(format!("/proc/{pid}/cmdline")).is_ok_and(|words| words.contains("network-emulator"))
-    };
-    let emulator = children.split_whitespace().find(is_emulator).expect("it runs").parse().expect("a number");
-    kill_process(Pid::from_raw(emulator).expect("a process"), Signal::KILL).expect("it is there");
+    kill_own(&control, "network-emulator");
     control.ends_with(1);
     assert_reported(&ground);
+}
+
+/// Nobody starts it again: the others fly to the end, and the run says what it lacks.
+#[test]
+fn an_own_flight_that_loses_a_vehicle_is_flown_to_its_end_and_says_so() {
+    let ground = Ground::new();
+    let text = with(&mission_text(MISSION), "duration_s = 3000.0", "duration_s = 120.0");
+    let mut control = own_flight_of(&ground, &text);
+    kill_own(&control, "b");
+    control.ends_with(1);
+    let said = control.stderr();
+    assert!(said.contains("; b is lost") && !said.contains("waiting for b"), "{said}");
+    assert_reported(&ground);
+    let recording = ground.recording("run");
+    for id in ["a", "c"] {
+        assert_eq!(states(&recording.exact, id).last().map(|row| row.t_ns), Some(120_000_000_000));
+    }
+    let summary = ground.json("run/summary.json");
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("the states of b end at ") && warnings.contains("b has ended"), "{warnings}");
+    assert_eq!(summary["complete"], false);
 }
 
 /// Nobody collects them, but they finish what they fly, and do not outlive it.

@@ -212,6 +212,63 @@ fn a_full_disk_is_exit_code_4() {
 }
 
 #[test]
+fn a_run_whose_disk_is_full_is_exit_code_4() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text(MISSION));
+    let arguments = ["run", "mission.toml", "--stepped", "--listen", "tcp/127.0.0.1:0", "--out", "run"];
+    let mut control = ground.start("mission-control", &mut cramped("mission-control", 48, &arguments));
+    control.ends_with(4);
+    let said = control.stderr();
+    assert!(said.lines().last().is_some_and(|line| line.contains("recording.mcap")), "{said}");
+    assert!(!ground.path("run/recording.mcap").exists(), "whole or not at all");
+}
+
+/// The network goes on without the emulator's log; the run says that it lacks a part of it.
+#[test]
+fn an_emulator_whose_disk_is_full_goes_on_and_says_so() {
+    let ground = Ground::new();
+    let text = with(&mission_text(MISSION), "duration_s = 3000.0", "duration_s = 1000.0");
+    ground.file("mission.toml", &text);
+    let mut command = cramped("network-emulator", 16, &["--listen", "tcp/127.0.0.1:0", "--logs", "logs"]);
+    let mut emulator = ground.start("network-emulator", &mut command);
+    let endpoint = cpf_tests::found(PATIENCE, "the emulator says where it listens", || {
+        emulator.stdout().split_once('\n').map(|(line, _)| line.to_string())
+    });
+    let _vehicles = ["a", "b", "c"].map(|id| ground.vehicle(id, &endpoint));
+    ground.controlled(0, &["run", "mission.toml", "--stepped", "--attach", &endpoint, "--out", "run"]);
+    let summary = ground.json("run/summary.json");
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("network-emulator-1.mcap ends in the middle"), "{warnings}");
+    assert_eq!(summary["complete"], false);
+    emulator.terminate();
+    emulator.ends_with(4);
+    let said = emulator.stderr();
+    assert!(said.contains("recording has stopped") && said.contains("the network goes on without it"), "{said}");
+}
+
+#[test]
+fn logs_that_cannot_be_kept_are_told_before_anything_is_flown() {
+    let ground = Ground::new();
+    let node = ["--id", "a", "--connect", "tcp/127.0.0.1:9", "--logs", "/proc/nope"];
+    let emulator = ["--listen", "tcp/127.0.0.1:0", "--logs", "/proc/nope"];
+    for (name, arguments) in [("vehicle-node", &node[..]), ("network-emulator", &emulator)] {
+        let mut process = ground.start(name, Command::new(program(name)).args(arguments));
+        process.ends_with(4);
+        let said = process.stderr();
+        assert!(said.lines().count() == 1 && said.contains("cannot keep logs in /proc/nope: "), "{said}");
+        assert_eq!(process.stdout(), "");
+    }
+}
+
+#[test]
+fn a_name_that_no_vehicle_can_have_is_wrong_use() {
+    let ground = Ground::new();
+    let mut process = ground.start("vehicle", Command::new(program("vehicle-node")).args(["--id", "A_Z!"]));
+    process.ends_with(2);
+    assert!(process.stderr().contains("`A_Z!` cannot be an identity"), "{}", process.stderr());
+}
+
+#[test]
 fn a_vehicle_whose_disk_is_full_flies_on_and_says_so() {
     let ground = Ground::new();
     let text = with(&mission_text(MISSION), "duration_s = 3000.0", "duration_s = 1000.0");
@@ -220,7 +277,9 @@ fn a_vehicle_whose_disk_is_full_flies_on_and_says_so() {
     let _others = ["a", "c"].map(|id| ground.vehicle(id, &endpoint));
     let mut command = cramped("vehicle-node", 16, &["--id", "b", "--connect", &endpoint, "--logs", "logs-b"]);
     let mut full = ground.start("b", &mut command);
-    ground.controlled(0, &["run", "mission.toml", "--stepped", "--attach", &endpoint, "--out", "run"]);
+    ground.controlled(1, &["run", "mission.toml", "--stepped", "--attach", &endpoint, "--out", "run"]);
+    let warnings = ground.json("run/summary.json")["warnings"].to_string();
+    assert!(warnings.contains("the states of b end at "), "{warnings}");
     full.terminate();
     full.ends_with(4);
     assert!(full.stderr().contains("recording has stopped"), "{}", full.stderr());

@@ -3,15 +3,18 @@
 
 use std::collections::BTreeMap;
 use std::sync::mpsc;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use bus::PROTOCOL_VERSION;
+use bus::queue::Events;
+use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
+use bus::{PROTOCOL_VERSION, Plane};
 use common::mission::Mission;
+use common::record::ClockRecord;
 use common::time::Time;
 use common::wire::state::CoordinationState;
-use common::wire::vehicle::{FromVehicle, LogPiece, Phase, ToVehicle};
-use common::wire::{decode, encode};
-use cpf_tests::{Ground, PATIENCE, Process, apart_at_last, mission, mission_text, of_vehicle, states};
+use common::wire::vehicle::{ClockPlan, FromVehicle, LogPiece, Phase, ToVehicle};
+use common::wire::{Garbage, decode, encode};
+use cpf_tests::{Ground, PATIENCE, Process, apart_at_last, found, mission, mission_text, of_vehicle, states, until};
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
@@ -139,6 +142,9 @@ fn garbage(number: u64, mission: &Mission) -> Vec<u8> {
     }
 }
 
+/// Zenoh's threads belong to the whole process: a flood in one test would hold up the other.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// Resident memory of a process \[KiB\].
 fn resident_kib(process: &Process) -> u64 {
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).expect("it lives");
@@ -148,6 +154,7 @@ fn resident_kib(process: &Process) -> u64 {
 
 #[test]
 fn whatever_one_vehicle_says_the_others_fly_on_and_agree() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let ground = Ground::new();
     let text = mission_text(MISSION);
     ground.file("mission.toml", &text);
@@ -206,6 +213,15 @@ fn whatever_one_vehicle_says_the_others_fly_on_and_agree() {
     };
     let ignored = notes.iter().find(|n| n["text"] == "messages ignored that came from c").expect("counted");
     assert!(ignored["count"].as_u64() > Some(50_000), "{ignored}");
+    // Of each kind there is one line, however often it came.
+    let first: Vec<&str> = notes
+        .iter()
+        .filter_map(|note| note["text"].as_str().filter(|text| text.starts_with("first message ignored from c")))
+        .collect();
+    assert!(
+        first.len() >= 4 && first.iter().collect::<std::collections::BTreeSet<_>>().len() == first.len(),
+        "{first:?}"
+    );
     assert_eq!((counted("ignored", "a"), counted("ignored", "b")), (0, 0), "{notes:?}");
     let recording = ground.recording("run");
     let apart = apart_at_last(&recording.exact, "a", "b");
@@ -217,4 +233,93 @@ fn whatever_one_vehicle_says_the_others_fly_on_and_agree() {
     for process in honest.iter_mut().chain([&mut emulator]) {
         assert!(process.is_running() && !process.stderr().contains("panicked"), "{}", process.stderr());
     }
+}
+
+/// A hub that hands a vehicle garbage of every kind, and what the vehicle says in answer.
+struct HostileHub {
+    switchboard: Switchboard,
+    events: Events<HubEvent>,
+    line: LineId,
+}
+
+impl HostileHub {
+    fn says(&self, plane: Plane, bytes: &[u8]) {
+        until(PATIENCE, "the line takes it", || match self.switchboard.send(self.line, plane, bytes) {
+            // What no plane carries does not get onto the line.
+            Ok(()) | Err(bus::Error::TooLarge { .. }) => true,
+            Err(_) => false,
+        });
+    }
+
+    /// The next answer of the vehicle that is such.
+    fn hears(&self, what: &str, is_such: impl Fn(&FromVehicle) -> bool) {
+        until(PATIENCE, what, || {
+            std::iter::from_fn(|| self.events.pop()).any(|event| match event {
+                HubEvent::Packet { plane: Plane::Mission, bytes, .. } => {
+                    decode(&bytes).is_ok_and(|said| is_such(&said))
+                }
+                _ => false,
+            })
+        });
+    }
+}
+
+#[test]
+fn garbage_costs_a_vehicle_no_memory_and_one_line_of_each_kind() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let ground = Ground::new();
+    let text = mission_text(MISSION);
+    let plan = mission(&text);
+    let anywhere = "tcp/127.0.0.1:0".parse().expect("an endpoint");
+    let (switchboard, events) = Switchboard::open(SwitchboardConfig::new(anywhere)).expect("it opens");
+    let mut vehicle = ground.vehicle("a", &switchboard.endpoint().to_string());
+    let line = found(PATIENCE, "the vehicle joins", || match events.pop() {
+        Some(HubEvent::Joined { line, .. }) => Some(line),
+        _ => None,
+    });
+    let hub = HostileHub { switchboard, events, line };
+    hub.says(Plane::Mission, &encode(&ToVehicle::Arm { mission: text }));
+    hub.hears("the vehicle is armed", |said| matches!(said, FromVehicle::Armed { .. }));
+    let now = std::time::SystemTime::UNIX_EPOCH.elapsed().expect("after 1970").as_nanos() as i64;
+    let clock = ClockPlan::Real { epoch_unix_ns: now, speed_up: 1.0 };
+    hub.says(Plane::Mission, &encode(&ToVehicle::Start { digest: plan.digest, clock, speeds: vec![] }));
+    until(PATIENCE, "the vehicle flies", || vehicle.stderr().contains("flying parallel-three"));
+
+    let helping = |numbers: std::ops::Range<u64>| {
+        for number in numbers {
+            hub.says(Plane::State, &garbage(number, &plan));
+            if number % 100 == 0 {
+                hub.says(Plane::Mission, &garbage(number, &plan));
+            }
+        }
+        // It answers in order: what was said before is done with.
+        hub.says(Plane::Mission, &encode(&ToVehicle::SendLog { digest: plan.digest, file: 0, offset: 0 }));
+        hub.hears("the vehicle answers", |said| matches!(said, FromVehicle::Log(_)));
+    };
+    helping(0..20_000);
+    let before = resident_kib(&vehicle);
+    helping(20_000..200_000);
+    let grown = resident_kib(&vehicle).saturating_sub(before);
+    assert!(grown < 16 << 10, "the vehicle's memory grew by {grown} KiB");
+
+    hub.says(Plane::Mission, &encode(&ToVehicle::Stop));
+    hub.hears("the vehicle stops", |said| matches!(said, FromVehicle::Ended { .. }));
+    vehicle.terminate();
+    vehicle.ends_with(0);
+    let log = bus::recording::read(ground.path(&format!("logs/{:016x}/a.mcap", plan.digest))).expect("it recorded");
+    let mut kinds: Vec<String> = Vec::new();
+    for record in &log.clock {
+        if let ClockRecord::Note(note) = record
+            && note.text.starts_with("first message ignored")
+        {
+            kinds.push(note.text.clone());
+        }
+    }
+    let count = kinds.len();
+    kinds.sort();
+    kinds.dedup();
+    assert!(count >= 4 && kinds.len() == count, "each kind once: {kinds:?}");
+    let said = vehicle.stderr();
+    let lines = said.lines().filter(|line| line.contains("ignored a message on the mission plane")).count();
+    assert!((1..=Garbage::ALL.len()).contains(&lines), "{said}");
 }

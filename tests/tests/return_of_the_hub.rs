@@ -56,6 +56,7 @@ fn after(order: &[(&str, usize)]) -> Vec<(bool, Phase, String)> {
         while let Some(output) = hub.poll_output() {
             match output {
                 HubOutput::FollowClock(clock) => hub.handle(now, Some(HubInput::ClockStarted(clock))),
+                HubOutput::OpenLog { .. } => hub.handle(now, Some(HubInput::LogOpened { last: None })),
                 HubOutput::ToVehicle(id, message) => {
                     let index = plan.index_of(&id).expect("a vehicle of the mission");
                     nodes[index].handle(now, Some(NodeInput::Message(message)));

@@ -192,3 +192,21 @@ fn a_fleet_started_by_hand_flies_three_flights() {
     emulator.terminate();
     assert!(emulator.ends(PATIENCE).success());
 }
+
+/// The stepped clock is not the wall clock of the flight before.
+#[test]
+fn flights_in_steps_and_in_real_time_take_turns_on_one_fleet() {
+    let ground = Ground::new();
+    let text = mission_text("tests/missions/parallel-three.toml");
+    let mission = ground.file("mission.toml", &with(&text, "duration_s = 3000.0", "duration_s = 100.0"));
+    let (_emulator, endpoint) = ground.emulator(FREE_PORT);
+    let _vehicles = ["a", "b", "c"].map(|id| ground.vehicle(id, &endpoint));
+    simulate(&ground, &mission, "simulated");
+    let run = ["run", "mission.toml", "--attach", &endpoint, "--out"];
+    for turn in 1..=2 {
+        let (real, stepped) = (format!("real-{turn}"), format!("stepped-{turn}"));
+        ground.controlled(0, &[&run[..], &[&real, "--speed-up", "50"]].concat());
+        ground.controlled(0, &[&run[..], &[&stepped, "--stepped"]].concat());
+        assert_equal_runs(&ground, &stepped, "simulated");
+    }
+}

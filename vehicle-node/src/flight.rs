@@ -359,8 +359,8 @@ impl Flight {
     fn fail(&mut self, now: Time, reason: &str) {
         self.over = true;
         self.warn(now);
-        let text = format!("{} at {now}: {reason}", self.mission.vehicles[self.me].id);
-        self.note(now, text.clone(), 1);
+        let text = format!("{reason}, at {now}");
+        self.note(now, format!("the flight was aborted: {text}"), 1);
         self.outputs.push_back(FlightOutput::Failed(text));
     }
 }

@@ -15,6 +15,9 @@ use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase,
 
 use crate::flight::{Flight, FlightInput, FlightOutput};
 
+/// The reason of a vehicle that was told to end its flight: it had none of its own.
+pub const STOPPED: &str = "stopped";
+
 /// What can happen to a vehicle process, beside the passing of time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NodeInput {
@@ -185,10 +188,8 @@ impl VehicleNode {
         }
         load.clock = Some(clock);
         load.speeds = speeds;
-        match clock {
-            ClockPlan::Real { .. } => self.outputs.push_back(NodeOutput::FollowClock(clock)),
-            ClockPlan::Stepped => self.open_log(true),
-        }
+        // The stepped clock too: the driver may still follow the wall clock of the flight before.
+        self.outputs.push_back(NodeOutput::FollowClock(clock));
     }
 
     fn open_log(&mut self, fresh: bool) {
@@ -198,11 +199,12 @@ impl VehicleNode {
         }
     }
 
-    /// Whether the flight began without this vehicle.
+    /// Whether the flight began without this vehicle; a stepped one waits for all.
     fn is_late(&self, now: Time) -> bool {
-        self.load
-            .as_ref()
-            .is_some_and(|load| now > Time::ZERO + load.mission.control_period * load.mission.message_ticks)
+        self.load.as_ref().is_some_and(|load| {
+            let real = matches!(load.clock, Some(ClockPlan::Real { .. }));
+            real && now > Time::ZERO + load.mission.control_period * load.mission.message_ticks
+        })
     }
 
     /// The log is open: begin, or join the others where this vehicle should be by now.
@@ -235,9 +237,16 @@ impl VehicleNode {
 
     fn speed(&mut self, command: SpeedCommand) {
         if let Some(load) = self.load.as_mut().filter(|_| self.phase == Phase::Running) {
+            // A hub tells all it knows to one that comes back: most of it is known here.
+            if load.speeds.contains(&command) {
+                return;
+            }
             load.speeds.push(command);
+            load.speeds.sort_by_key(|known| known.at);
+            // Also those after it: a command replaces what was to hold from its instant on.
+            let from_here = load.speeds.iter().filter(|known| known.at >= command.at);
             if let Some(flight) = &mut load.flight {
-                flight.handle(command.at, Some(FlightInput::Speed(command)));
+                from_here.for_each(|known| flight.handle(known.at, Some(FlightInput::Speed(*known))));
             }
         }
     }
@@ -248,8 +257,8 @@ impl VehicleNode {
         }
         if matches!(self.phase, Phase::Running | Phase::Armed) {
             self.phase = Phase::Aborted;
-            self.say("stopped".to_string());
-            self.send(FromVehicle::Ended { phase: Phase::Aborted, reason: "stopped".to_string() });
+            self.say(STOPPED.to_string());
+            self.send(FromVehicle::Ended { phase: Phase::Aborted, reason: STOPPED.to_string() });
         }
     }
 
@@ -378,5 +387,76 @@ impl Machine for VehicleNode {
             Some(ClockPlan::Real { .. }) => load.flight.as_ref().and_then(Flight::poll_timeout),
             _ => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HELIX: &str = include_str!("../../missions/auv-helix.toml");
+
+    fn outputs(node: &mut VehicleNode) -> Vec<NodeOutput> {
+        std::iter::from_fn(|| node.poll_output()).collect()
+    }
+
+    /// Arms a vehicle and starts it by this clock, of which it is `now` when the driver has it.
+    fn started(node: &mut VehicleNode, clock: ClockPlan, now: Time) -> Vec<NodeOutput> {
+        let digest = common::mission::digest(HELIX);
+        let arm = ToVehicle::Arm { mission: HELIX.to_string() };
+        for message in [arm, ToVehicle::Start { digest, clock, speeds: Vec::new() }] {
+            node.handle(now, Some(NodeInput::Message(message)));
+        }
+        let followed = outputs(node);
+        assert!(followed.contains(&NodeOutput::FollowClock(clock)), "{followed:?}");
+        node.handle(now, Some(NodeInput::ClockStarted));
+        outputs(node)
+    }
+
+    fn opens_afresh(outputs: &[NodeOutput]) -> bool {
+        outputs.iter().any(|output| matches!(output, NodeOutput::OpenLog { fresh: true, .. }))
+    }
+
+    #[test]
+    fn a_stepped_flight_after_a_real_one_begins_at_its_begin() {
+        let mut node = VehicleNode::new("auv1");
+        let real = ClockPlan::Real { epoch_unix_ns: 0, speed_up: 400.0 };
+        assert!(opens_afresh(&started(&mut node, real, Time::ZERO)));
+        node.handle(Time::ZERO, Some(NodeInput::LogOpened { last: None }));
+        node.handle(Time::from_secs(800.0), None);
+        assert_eq!(node.phase(), Phase::Finished);
+        outputs(&mut node);
+        // Whatever the time of the driver is: a stepped flight begins at zero, for all.
+        let long_after = Time::from_secs(994.6);
+        assert!(opens_afresh(&started(&mut node, ClockPlan::Stepped, long_after)));
+        node.handle(long_after, Some(NodeInput::LogOpened { last: None }));
+        let said = outputs(&mut node);
+        assert!(
+            said.iter().any(|output| matches!(output, NodeOutput::Say(text) if text == "flying auv-helix")),
+            "{said:?}"
+        );
+        let until = Time::from_secs(1.0);
+        node.handle(long_after, Some(NodeInput::Message(ToVehicle::Grant { until, heard: vec![], speeds: vec![] })));
+        let first = outputs(&mut node).into_iter().find_map(|output| match output {
+            NodeOutput::Record(Row::Exact(common::record::Record::State(row))) => Some(row.t_ns),
+            _ => None,
+        });
+        assert_eq!(first, Some(0));
+    }
+
+    #[test]
+    fn a_speed_that_is_told_twice_is_known_once() {
+        let mut node = VehicleNode::new("auv1");
+        started(&mut node, ClockPlan::Real { epoch_unix_ns: 0, speed_up: 1.0 }, Time::ZERO);
+        node.handle(Time::ZERO, Some(NodeInput::LogOpened { last: None }));
+        let command = SpeedCommand { at: Time::from_secs(1.0), speed: 0.2 };
+        for _ in 0..2 {
+            node.handle(Time::ZERO, Some(NodeInput::Message(ToVehicle::Speed(command))));
+        }
+        outputs(&mut node);
+        node.handle(Time::ZERO, Some(NodeInput::Connected));
+        let said = outputs(&mut node);
+        let [NodeOutput::Send(FromVehicle::Hello { flight: Some(flight), .. })] = &said[..] else { panic!("{said:?}") };
+        assert_eq!(flight.speeds, vec![command]);
     }
 }

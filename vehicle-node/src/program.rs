@@ -22,7 +22,7 @@ use crate::node::{NodeInput, NodeOutput, VehicleNode};
 /// It starts knowing only its name. It waits for the network-emulator, gets its mission from mission-control through it,
 /// flies, keeps its log, and waits for the next mission. It goes on flying when the network or mission-control is lost.
 ///
-/// Exit codes: 0 ended as asked, 2 wrong use, 3 no way to the network-emulator, 4 recording failed.
+/// Exit codes: 0 ended as asked, 2 wrong use, 3 no way to the network-emulator, 4 no logs can be kept, or recording failed.
 #[derive(Clone, Debug, Parser)]
 #[command(
     name = "vehicle-node",
@@ -38,7 +38,7 @@ pub struct Args {
     /// The network-emulator to connect to
     #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_CONNECT")]
     pub connect: Endpoint,
-    /// Folder for the logs of this vehicle
+    /// Folder for the logs of this vehicle; of earlier flights of a mission it keeps the newest five
     #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
     pub logs: PathBuf,
     /// Give up when the network-emulator has not been found for this long (s) (default: never)
@@ -56,6 +56,15 @@ pub struct Args {
 pub fn run(args: Args) -> ExitCode {
     let id = args.id.unwrap_or_else(bus::console::host_name);
     let stop = StopFlag::on_signals();
+    if let Err(refusal) = bus::check_id(&id) {
+        tracing::error!("--id: {refusal}");
+        return ExitCode::from(2);
+    }
+    let logs = Logs::new(&args.logs, &id);
+    if let Err(reason) = logs.check() {
+        tracing::error!("{id}: {reason}");
+        return ExitCode::from(4);
+    }
     let mut config = LineConfig::new(args.connect, id.as_str());
     config.patience = args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64);
     let (line, events) = match Line::connect(config) {
@@ -68,7 +77,7 @@ pub fn run(args: Args) -> ExitCode {
     stop.arm();
     let node = VehicleNode::new(&id);
     let port = VehiclePort {
-        logs: Logs::new(&args.logs, &id),
+        logs,
         id,
         line,
         stop,
@@ -159,7 +168,7 @@ impl Port for VehiclePort {
             }
             NodeOutput::OpenLog { mission, fresh } => {
                 return Next::Feed(match self.logs.open(&mission.0, fresh) {
-                    Ok(last) => NodeInput::LogOpened { last: last.map(Box::new) },
+                    Ok(earlier) => NodeInput::LogOpened { last: earlier.last_state.map(Box::new) },
                     Err(reason) => {
                         tracing::error!("{}: {reason}", self.id);
                         self.recording_failed = true;

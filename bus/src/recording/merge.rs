@@ -66,9 +66,25 @@ impl<W: Write + Seek> CanonicalRecorder<W> {
         self.recorder.refused()
     }
 
+    /// A hub that comes back records the speed commands again that it is told of. Of twins the last counts: it may have
+    /// been said after others. Speeds come first in an instant.
+    fn take_twins_for_one(&mut self) {
+        let mut speeds = self.instant.partition_point(|row| matches!(row, Row::Exact(Record::Speed(_))));
+        let mut index = 0;
+        while index < speeds {
+            if self.instant[index + 1..speeds].contains(&self.instant[index]) {
+                self.instant.remove(index);
+                speeds -= 1;
+            } else {
+                index += 1;
+            }
+        }
+    }
+
     fn close_instant(&mut self) -> Result<()> {
         // Stable: rows that compare equal keep the order in which they came.
         self.instant.sort_by(canonical_order);
+        self.take_twins_for_one();
         for row in self.instant.drain(..) {
             self.recorder.write(&row)?;
         }
@@ -85,8 +101,8 @@ pub struct Merged {
     pub incomplete: Vec<PathBuf>,
     /// Inputs with damaged chunks, which were left out: how many, and what was wrong with the first.
     pub damaged: Vec<(PathBuf, u64, String)>,
-    /// When the states of each vehicle begin \[ns\].
-    pub begins: BTreeMap<Name, i64>,
+    /// When the states of each vehicle begin and end \[ns\].
+    pub spans: BTreeMap<Name, (i64, i64)>,
 }
 
 /// Merges recordings of one mission into `output`, in [canonical order](canonical_order); the same rows give the same
@@ -170,18 +186,18 @@ fn open_all<P: AsRef<Path>>(inputs: &[P]) -> Result<(Origin, Vec<Input>)> {
 fn merge_in_stream<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {
     let (origin, mut inputs) = open_all(inputs)?;
     let mut recorder = create(output, &origin)?;
-    let mut begins = BTreeMap::new();
+    let mut spans = BTreeMap::new();
     // At each turn, the input whose next row is earliest; on a tie the first, so that input order is kept.
     while let Some(input) =
         inputs.iter_mut().filter(|input| input.next.is_some()).min_by_key(|input| input.next.as_ref().map(time_of))
     {
         if let Some(row) = input.next.take() {
-            note_begin(&mut begins, &row);
+            note_span(&mut spans, &row);
             recorder.write(row)?;
         }
         input.next = input.rows.next().transpose()?;
     }
-    finish(recorder, output, &inputs, begins)
+    finish(recorder, output, &inputs, spans)
 }
 
 fn merge_in_memory<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {
@@ -195,20 +211,21 @@ fn merge_in_memory<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged
     }
     all.sort_by(canonical_order);
     let mut recorder = create(output, &origin)?;
-    let mut begins = BTreeMap::new();
+    let mut spans = BTreeMap::new();
     for row in all {
-        note_begin(&mut begins, &row);
+        note_span(&mut spans, &row);
         recorder.write(row)?;
     }
-    finish(recorder, output, &inputs, begins)
+    finish(recorder, output, &inputs, spans)
 }
 
 /// Rows come in order of time.
-fn note_begin(begins: &mut BTreeMap<Name, i64>, row: &Row) {
-    if let Row::Exact(Record::State(state)) = row
-        && !begins.contains_key(&state.vehicle)
-    {
-        begins.insert(state.vehicle.clone(), state.t_ns);
+fn note_span(spans: &mut BTreeMap<Name, (i64, i64)>, row: &Row) {
+    if let Row::Exact(Record::State(state)) = row {
+        match spans.get_mut(&state.vehicle) {
+            Some((_, end)) => *end = state.t_ns,
+            None => drop(spans.insert(state.vehicle.clone(), (state.t_ns, state.t_ns))),
+        }
     }
 }
 
@@ -222,7 +239,7 @@ fn finish(
     mut recorder: CanonicalRecorder<BufWriter<File>>,
     output: &Path,
     inputs: &[Input],
-    begins: BTreeMap<Name, i64>,
+    spans: BTreeMap<Name, (i64, i64)>,
 ) -> Result<Merged> {
     recorder.close_instant()?;
     let rows = recorder.recorder.rows();
@@ -234,7 +251,7 @@ fn finish(
         let cause = input.rows.damage().unwrap_or_default().to_owned();
         (input.rows.skipped() > 0).then(|| (place(input), input.rows.skipped(), cause))
     });
-    Ok(Merged { rows, incomplete: incomplete.map(place).collect(), damaged: damaged.collect(), begins })
+    Ok(Merged { rows, incomplete: incomplete.map(place).collect(), damaged: damaged.collect(), spans })
 }
 
 /// The temporary file that becomes `output`; beside it, so that renaming does not copy.
@@ -346,12 +363,23 @@ mod tests {
         }
         let output = directory.path().join("recording.mcap");
         let merged = merge(&[&whole, &cut], &output).expect("merges");
-        let begins = BTreeMap::from([("a".into(), 0)]);
-        assert_eq!(merged, Merged { rows: 3, incomplete: vec![cut.clone()], damaged: vec![], begins });
+        let spans = BTreeMap::from([("a".into(), (0, 0))]);
+        assert_eq!(merged, Merged { rows: 3, incomplete: vec![cut.clone()], damaged: vec![], spans });
 
         let recovered = recover(&cut, directory.path().join("recovered.mcap")).expect("recovers");
         assert_eq!(recovered, Recovered { rows: 1, was_complete: false, damage: None });
         assert!(read(directory.path().join("recovered.mcap")).expect("reads").complete);
+    }
+
+    #[test]
+    fn a_command_that_was_recorded_twice_is_one() {
+        use common::record::{Record, SpeedRow};
+        let speed = |t_ns, speed| Row::Exact(Record::Speed(SpeedRow { t_ns, speed }));
+        let (first, second) = (vec![speed(0, 0.5), speed(7, 0.4)], vec![speed(0, 0.5), speed(7, 0.3), speed(7, 0.4)]);
+        let (_directory, path, merged) = merged(&[first, second], 1);
+        assert_eq!(merged.rows, 3);
+        let rows: Vec<Row> = RowReader::open(path).expect("opens").map(|row| row.expect("reads")).collect();
+        assert_eq!(rows, [speed(0, 0.5), speed(7, 0.3), speed(7, 0.4)]);
     }
 
     #[test]

@@ -191,6 +191,11 @@ impl Mission {
     /// (erratum 4.14): v_L less what δ costs, for vehicles with the gains of the first. At rest z = (Lγ + α_2)/(a_1 + a_2), so
     /// η = −α_2 a_2/(a_1(a_1 + a_2)): that of type I with k_η = a_1(a_1 + a_2)/a_2.
     pub fn excited_speed(&self) -> Option<f64> {
+        self.excited_speed_at(self.speed.at(self.end).v_l)
+    }
+
+    /// [`excited_speed`](Mission::excited_speed) when the formation speed is this one.
+    pub fn excited_speed_at(&self, v_l: f64) -> Option<f64> {
         let file::LawChoice::Auxiliary(law) = &self.law_choice else { return None };
         let plan = self.vehicles.first()?;
         let (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) =
@@ -200,7 +205,7 @@ impl Mission {
         };
         let mut gains = build::auv_gains(gains);
         gains.k_eta = law.a1 * (law.a1 + law.a2) / law.a2;
-        let (v_l, stretch) = (self.speed.at(self.end).v_l, plan.path.at(plan.start.xi).r());
+        let stretch = plan.path.at(plan.start.xi).r();
         Some(gains.predicted_rate_type_1(&build::auv(model).ok()?, v_l, v_l, stretch))
     }
 

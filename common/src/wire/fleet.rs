@@ -110,6 +110,8 @@ pub struct FleetStatus {
     pub vehicles: Vec<VehicleStatus>,
     /// Whether the logs of a flight that is over have been collected.
     pub collected: bool,
+    /// How mission time passes in the flight under way, or passed in the one that is over.
+    pub pace: Option<Pace>,
     /// Messages taken, delivered, dropped and in flight, over all links.
     pub messages: [u64; 4],
 }

@@ -25,6 +25,8 @@ pub struct Facts {
     pub guaranteed_rate: Option<f64>,
     /// The factor c of the guarantee ‖e(t)‖ ≤ c·exp(−rate·t)·‖e(0)‖; the envelope is drawn where it is known.
     pub guaranteed_factor: Option<f64>,
+    /// The formation speed v_L in force at the end \[units of ξ per s\].
+    pub formation_speed_at_the_end: Option<f64>,
     /// The formation speed that theory predicts for the fleet \[units of ξ per s\].
     pub predicted_speed: Option<f64>,
     /// The mean along-track error that theory predicts \[m\].
@@ -35,6 +37,10 @@ pub struct Facts {
     pub xi_unit: String,
     /// Whether the paths leave the plane; chooses the figures.
     pub spatial: bool,
+    /// What could not be collected, and why.
+    pub missing: Vec<String>,
+    /// Vehicles that gave up, and why.
+    pub aborted: Vec<String>,
 }
 
 /// What is known of one vehicle.

@@ -34,7 +34,7 @@ pub struct Summary {
     pub seed: u64,
     /// Length of the mission \[s\].
     pub duration_s: f64,
-    /// Whether the recording reaches its end.
+    /// Whether nothing is missing: the recording reaches its end, all logs were collected, and every vehicle has states.
     pub complete: bool,
     /// The fleet as a whole.
     pub fleet: FleetSummary,
@@ -57,6 +57,8 @@ pub struct FleetSummary {
     pub predicted_speed: Option<f64>,
     /// The formation speed that was commanded last.
     pub formation_speed: Option<f64>,
+    /// The formation speed in force at the end, which the prediction is about.
+    pub formation_speed_at_the_end: Option<f64>,
     /// Largest path-following error of any vehicle at the end \[m\].
     pub path_error_final_m: f64,
     /// When the last vehicle was on its path to stay, within 0.1 m \[s\].
@@ -257,24 +259,28 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         steady_speed: mean(present().map(|vehicle| vehicle.steady_speed)),
         predicted_speed: facts.predicted_speed,
         formation_speed: speeds(exact).last().map(|row| row.speed),
+        formation_speed_at_the_end: facts.formation_speed_at_the_end,
         path_error_final_m: largest(present().map(|vehicle| vehicle.path_error_final_m)),
         on_path_s: present().map(|vehicle| vehicle.on_path_s).collect::<Option<Vec<f64>>>().map(largest),
         messages: totals(&links, &said, facts),
         connectivity: network.connectivity(facts),
         coordination: coordination_summary(&coordination, facts),
     };
-    let warnings = warnings(recording, &vehicles, &links);
+    let complete = recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);
+    let mut known = facts.aborted.clone();
+    known.extend_from_slice(&facts.missing);
+    known.extend(warnings(recording, &vehicles, &links));
     Summary {
         format: 1,
         mission: facts.mission.clone(),
         digest: recording.digest.clone(),
         seed: recording.seed,
         duration_s: facts.duration_s,
-        complete: recording.complete,
+        complete,
         fleet,
         vehicles,
         links,
-        warnings,
+        warnings: known,
     }
 }
 
@@ -520,6 +526,21 @@ mod tests {
         let expected =
             ["1 control period.", "40 control periods."].map(|n| format!("v2: an actuator was at its limit, in {n}"));
         assert_eq!(warnings, expected);
+    }
+
+    #[test]
+    fn who_gave_up_and_what_is_missing_is_told() {
+        let whole = summarise(&fleet(false), &facts(false));
+        assert!(whole.complete && whole.warnings.is_empty(), "{:?}", whole.warnings);
+        let gave_up = Facts { aborted: vec!["v2 aborted".into()], ..facts(false) };
+        let summary = summarise(&fleet(false), &gave_up);
+        assert!(summary.complete && summary.warnings == gave_up.aborted, "{:?}", summary.warnings);
+        let lacking = Facts { missing: vec!["log of v2: lost".into()], ..facts(false) };
+        let summary = summarise(&fleet(false), &lacking);
+        assert!(!summary.complete && summary.warnings == lacking.missing, "{:?}", summary.warnings);
+        let mut without = fleet(false);
+        without.exact.retain(|record| !matches!(record, Record::State(row) if *row.vehicle == *"v2"));
+        assert!(!summarise(&without, &facts(false)).complete);
     }
 
     #[test]

@@ -58,6 +58,9 @@ pub(super) fn facts(spatial: bool) -> Facts {
         symbol: if spatial { "γ".into() } else { "ξ".into() },
         xi_unit: String::new(),
         spatial,
+        formation_speed_at_the_end: Some(0.5),
+        missing: Vec::new(),
+        aborted: Vec::new(),
     }
 }
 

@@ -92,8 +92,9 @@ pub(super) fn connected_in_mean(case: &Case<'_>) -> TheoryRow {
 
 pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
     let mission = case.mission;
-    let v_l = mission.speed.at(mission.end).v_l;
-    let excited = mission.excited_speed();
+    let planned = mission.speed.at(mission.end).v_l;
+    let v_l = case.summary.and_then(|s| s.fleet.formation_speed_at_the_end).unwrap_or(planned);
+    let excited = mission.excited_speed_at(v_l);
     let (name, condition, value) = match mission.law_delay() {
         _ if excited.is_some() => {
             ("Fleet speed left by δ under (4.59) (erratum 4.14)", "α₂ at rest".to_string(), format!("v_L = {v_l:.4}"))

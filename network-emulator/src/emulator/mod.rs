@@ -140,6 +140,22 @@ impl Emulator {
         }
     }
 
+    /// Nothing passed from `gone` on until the present, `back`: every link was down, and is now as planned.
+    pub fn was_away(&mut self, gone: Time, back: Time) {
+        for (t, away) in [(gone, true), (back, false)] {
+            for index in 0..self.links.len() {
+                self.record_topology(t, index, !away && self.up[index]);
+            }
+        }
+    }
+
+    fn record_topology(&mut self, t: Time, link: usize, up: bool) {
+        let name = |vehicle: usize| self.names[vehicle].clone();
+        let (from, to) = (name(self.links[link].from), name(self.links[link].to));
+        let row = TopologyRow { t_ns: t.nanos(), from, to, up };
+        self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));
+    }
+
     /// Takes a message from a vehicle: one decision per directed link.
     fn take(&mut self, now: Time, sent: &Sent) -> Result<(), Garbage> {
         let state = CoordinationState::decode(&sent.bytes)?;
@@ -248,13 +264,7 @@ impl Emulator {
             let up = self.switching.is_up(index, t);
             let first = t == Time::ZERO;
             if record && (first || up != self.up[index]) {
-                let row = TopologyRow {
-                    t_ns: t.nanos(),
-                    from: self.names[self.links[index].from].clone(),
-                    to: self.names[self.links[index].to].clone(),
-                    up,
-                };
-                self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));
+                self.record_topology(t, index, up);
             }
             self.up[index] = up;
         }

@@ -3,7 +3,7 @@
 use common::machine::Machine;
 use common::record::{Record, Row, SpeedRow};
 use common::time::Time;
-use common::wire::vehicle::{ClockPlan, Phase, ToVehicle};
+use common::wire::vehicle::{ClockPlan, Phase, SpeedCommand, ToVehicle};
 
 use super::{Hub, HubOutput, Opened};
 use crate::emulator::{Channel, Emulator, Sent};
@@ -12,6 +12,7 @@ use crate::lockstep::Lockstep;
 impl Hub {
     pub(super) fn clock_started(&mut self, now: Time, clock: ClockPlan) {
         let Some(load) = &mut self.load else { return };
+        self.flown = true;
         let speed_up = match clock {
             ClockPlan::Real { speed_up, .. } => Some(speed_up),
             ClockPlan::Stepped => None,
@@ -26,16 +27,13 @@ impl Hub {
         if load.adopted {
             load.emulator.skip_to(now);
             while load.emulator.poll_output().is_some() {}
-            let text = format!("the emulator came back at {now}");
-            return self.note(now, &text);
+            return;
         }
         load.speeds.clear();
         let digest = load.mission.digest;
-        for step in load.mission.speed.steps() {
-            let row = SpeedRow { t_ns: step.at.nanos(), speed: step.speed };
-            self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
-        }
         let name = load.mission.name.clone();
+        let planned = load.mission.speed.steps().to_vec();
+        self.record_speeds(&planned);
         for known in self.vehicles.values_mut().filter(|known| known.phase == Phase::Armed) {
             known.phase = Phase::Running;
         }
@@ -44,6 +42,28 @@ impl Hub {
         self.say(format!("{name} is under way"));
         if !real {
             self.grant();
+        }
+    }
+
+    /// A flight was taken up: what the hub knows of it is recorded again, for what it recorded last before it was killed
+    /// never got to the disk; merging takes twins for one. Nothing went from vehicle to vehicle meanwhile.
+    pub(super) fn log_opened(&mut self, now: Time, last: Option<Time>) {
+        let Some(load) = self.load.as_mut().filter(|load| load.adopted && load.phase == Phase::Running) else { return };
+        let back = now.min(load.mission.end);
+        let gone = last.unwrap_or(Time::ZERO).min(back);
+        load.emulator.skip_to(back);
+        while load.emulator.poll_output().is_some() {}
+        load.emulator.was_away(gone, back);
+        let known = [load.mission.speed.steps(), &load.speeds[..]].concat();
+        self.record_speeds(&known);
+        self.drain_emulator();
+        self.note(now, &format!("the emulator came back at {now}; every link was down from {gone} on"));
+    }
+
+    pub(super) fn record_speeds(&mut self, commands: &[SpeedCommand]) {
+        for command in commands {
+            let row = SpeedRow { t_ns: command.at.nanos(), speed: command.speed };
+            self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use common::mission::Mission;
-use common::record::{ClockRecord, NoteRow, Record, Row, SpeedRow};
+use common::record::{ClockRecord, NoteRow, Row};
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
@@ -79,6 +79,10 @@ impl Hub {
             speed,
             vehicles,
             collected: load.is_some_and(|load| load.collected),
+            pace: load.and_then(|load| load.clock).map(|clock| match clock {
+                ClockPlan::Real { speed_up, .. } => Pace::Real { speed_up },
+                ClockPlan::Stepped => Pace::Stepped,
+            }),
             messages: self.totals(),
         };
         self.answer(FromFleet::Status(status));
@@ -141,6 +145,9 @@ impl Hub {
         if load.phase == Phase::Running {
             return self.refuse(format!("{} is already under way", load.mission.name));
         }
+        if load.phase != Phase::Armed {
+            return self.refuse(format!("{} is over; load it again to fly it again", load.mission.name));
+        }
         let missing: Vec<&str> = load
             .mission
             .vehicles
@@ -171,12 +178,11 @@ impl Hub {
         };
         let command = SpeedCommand { at, speed };
         load.speeds.push(command);
-        let row = SpeedRow { t_ns: at.nanos(), speed };
-        self.outputs.push_back(HubOutput::Record(Row::Exact(Record::Speed(row))));
         match &mut load.lockstep {
             Some(lockstep) => lockstep.speeds.push(command),
             None => self.tell_fleet(&ToVehicle::Speed(command)),
         }
+        self.record_speeds(&[command]);
         self.answer(FromFleet::SpeedTaken { at, speed });
     }
 
@@ -184,8 +190,9 @@ impl Hub {
         let Some(load) = self.load.as_mut().filter(|load| matches!(load.phase, Phase::Running | Phase::Armed)) else {
             return self.refuse("no flight is under way, so there is nothing to stop".into());
         };
-        let now = if load.lockstep.is_some() { load.lockstep.as_ref().map_or(now, |l| l.done()) } else { now };
         let was_running = load.phase == Phase::Running;
+        // Before the start, the driver's clock is still that of the flight before.
+        let now = if was_running { load.lockstep.as_ref().map_or(now, |l| l.done()) } else { load.now };
         load.phase = Phase::Aborted;
         load.now = now;
         if was_running {

@@ -58,6 +58,11 @@ pub enum HubInput {
     LogFailed(String),
     /// The driver has started the clock.
     ClockStarted(ClockPlan),
+    /// The log of a flight that was taken up is open; `last` is the time up to which an earlier life of the hub recorded.
+    LogOpened {
+        /// That time, if there is an earlier log.
+        last: Option<Time>,
+    },
     /// A piece of the hub's own log, as asked for.
     Log(LogPiece),
 }
@@ -76,7 +81,7 @@ pub enum HubOutput {
         /// What.
         message: FromFleet,
     },
-    /// Open a log for this mission.
+    /// Open a log for this mission and answer with [`HubInput::LogOpened`].
     OpenLog {
         /// The mission.
         mission: Opened,
@@ -126,6 +131,8 @@ pub struct Hub {
     load: Option<Load>,
     /// Who asked for what is being answered.
     asker: Option<String>,
+    /// Whether this life of the hub has seen a flight: of one that it has not seen it may have lost its memory.
+    flown: bool,
     /// Most control periods in one grant of the stepped clock.
     window: i64,
     outputs: VecDeque<HubOutput>,
@@ -170,7 +177,15 @@ impl Hub {
 
     /// A hub whose stepped clock grants at most this many control periods at once. What is flown does not depend on it.
     pub fn with_window(window: i64) -> Hub {
-        Hub { vehicles: BTreeMap::new(), aboard: Vec::new(), load: None, asker: None, window, outputs: VecDeque::new() }
+        Hub {
+            vehicles: BTreeMap::new(),
+            aboard: Vec::new(),
+            load: None,
+            asker: None,
+            flown: false,
+            window,
+            outputs: VecDeque::new(),
+        }
     }
 
     /// Where the fleet is in its life.
@@ -237,6 +252,7 @@ impl Machine for Hub {
             }
             Some(HubInput::LogFailed(reason)) => self.stop(now, &reason),
             Some(HubInput::ClockStarted(clock)) => self.clock_started(now, clock),
+            Some(HubInput::LogOpened { last }) => self.log_opened(now, last),
             Some(HubInput::Log(piece)) => {
                 self.collected(HUB, piece);
             }

@@ -153,3 +153,120 @@ fn a_speed_that_is_no_number_is_refused() {
         assert!(refusal(&ask(&mut hub, Time::from_secs(1.0), ToFleet::Speed { speed })).is_some());
     }
 }
+
+fn ended(hub: &mut Hub, at_s: f64, id: &str, reason: &str) -> Vec<HubOutput> {
+    let message = FromVehicle::Ended { phase: Phase::Aborted, reason: reason.into() };
+    hub.handle(Time::from_secs(at_s), Some(HubInput::FromVehicle(id.into(), message)));
+    outputs(hub)
+}
+
+fn notes(outputs: &[HubOutput]) -> Vec<&str> {
+    let text = |output| match output {
+        &HubOutput::Record(Row::Clock(common::record::ClockRecord::Note(ref row))) => Some(row.text.as_str()),
+        _ => None,
+    };
+    outputs.iter().filter_map(text).collect()
+}
+
+#[test]
+fn a_real_flight_ends_when_no_vehicle_flies_any_more() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let said = ended(&mut hub, 1.0, "auv1", "it has diverged");
+    assert_eq!(notes(&said), ["auv1 aborted: it has diverged"]);
+    ended(&mut hub, 1.1, "auv2", "it has diverged");
+    assert_eq!(hub.phase(), Phase::Running, "auv3 flies on");
+    let said = ended(&mut hub, 1.2, "auv3", "it has diverged");
+    assert_eq!(hub.phase(), Phase::Aborted);
+    assert!(said.contains(&HubOutput::CloseLog) && notes(&said).contains(&"no vehicle flies any more"), "{said:?}");
+}
+
+#[test]
+fn a_flight_that_was_stopped_before_its_start_does_not_start() {
+    let mut hub = Hub::new();
+    IDS.iter().for_each(|id| drop(join(&mut hub, id, Phase::Idle, None)));
+    ask(&mut hub, Time::ZERO, ToFleet::Upload { mission: HELIX.into() });
+    IDS.iter().for_each(|id| drop(arm(&mut hub, Time::ZERO, id)));
+    let said = ask(&mut hub, Time::from_secs(900.0), ToFleet::Stop);
+    let stopped = |output: &HubOutput| match output {
+        HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some((status.phase, status.now)),
+        _ => None,
+    };
+    // The time of a flight before is none of this one's.
+    assert_eq!(said.iter().find_map(stopped), Some((Phase::Aborted, Time::ZERO)));
+    assert!(refusal(&ask(&mut hub, Time::ZERO, ToFleet::Start { pace: Pace::Stepped })).is_some());
+}
+
+fn running(speeds: Vec<SpeedCommand>, epoch_unix_ns: i64) -> Option<FlightPlan> {
+    Some(FlightPlan { mission: HELIX.into(), clock: ClockPlan::Real { epoch_unix_ns, speed_up: 1.0 }, speeds })
+}
+
+fn hello(hub: &mut Hub, id: &str, flight: Option<FlightPlan>) -> Vec<HubOutput> {
+    let hello = FromVehicle::Hello { phase: Phase::Running, flight };
+    hub.handle(Time::from_secs(50.0), Some(HubInput::FromVehicle(id.into(), hello)));
+    outputs(hub)
+}
+
+#[test]
+fn a_vehicle_that_missed_the_end_of_its_flight_is_stopped_and_armed_for_the_next() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    hub.handle(Time::from_secs(1.0), Some(HubInput::Left("auv2".into())));
+    ask(&mut hub, Time::from_secs(2.0), ToFleet::Stop);
+    ask(&mut hub, Time::from_secs(3.0), ToFleet::Upload { mission: HELIX.into() });
+    hub.handle(Time::from_secs(4.0), Some(joined("auv2")));
+    let said = hello(&mut hub, "auv2", running(vec![], 0));
+    assert!(matches!(told(&said, "auv2")[..], [ToVehicle::Stop, ToVehicle::Arm { .. }]), "{said:?}");
+    // The same when the next flight is under way.
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let said = hello(&mut hub, "auv2", running(vec![], -7));
+    assert!(matches!(told(&said, "auv2")[..], [ToVehicle::Stop, ToVehicle::Arm { .. }]), "{said:?}");
+    assert!(told(&hello(&mut hub, "auv1", running(vec![], 0)), "auv1").is_empty(), "in the flight under way");
+}
+
+#[test]
+fn a_hub_without_memory_that_was_given_the_mission_again_takes_up_the_flight() {
+    let mut hub = Hub::new();
+    ask(&mut hub, Time::ZERO, ToFleet::Upload { mission: HELIX.into() });
+    hub.handle(Time::ZERO, Some(joined("auv3")));
+    let said = hello(&mut hub, "auv3", running(vec![], 0));
+    assert!(said.contains(&HubOutput::FollowClock(epoch())), "{said:?}");
+}
+
+fn recorded(outputs: &[HubOutput]) -> Vec<&common::record::Record> {
+    let record = |output| match output {
+        &HubOutput::Record(Row::Exact(ref record)) => Some(record),
+        _ => None,
+    };
+    outputs.iter().filter_map(record).collect()
+}
+
+#[test]
+fn what_is_known_of_a_flight_that_is_taken_up_is_recorded_again_and_links_were_down() {
+    use common::record::Record;
+    let command = |at_s, speed| SpeedCommand { at: Time::from_secs(at_s), speed };
+    let mut hub = Hub::new();
+    join(&mut hub, "auv3", Phase::Running, running(vec![command(30.0, 0.2)], 0));
+    hub.handle(Time::from_secs(58.0), Some(HubInput::ClockStarted(epoch())));
+    outputs(&mut hub);
+    let last = Some(Time::from_secs(40.0));
+    hub.handle(Time::from_secs(58.0), Some(HubInput::LogOpened { last }));
+    let said = outputs(&mut hub);
+    let mut speeds = Vec::new();
+    let mut changes = Vec::new();
+    for record in recorded(&said) {
+        match record {
+            Record::Speed(row) => speeds.push((row.t_ns / 1_000_000_000, row.speed)),
+            Record::Topology(row) => changes.push((row.t_ns / 1_000_000_000, row.up)),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(speeds, [(0, 0.5), (30, 0.2)]);
+    // Four links, down from the last row on; at 58 s the network of this mission is up.
+    assert_eq!(changes, [[(40, false); 4], [(58, true); 4]].concat());
+    // Another vehicle knows of a speed that this one missed: all are told, and it is recorded.
+    hub.handle(Time::from_secs(59.0), Some(joined("auv1")));
+    let said = hello(&mut hub, "auv1", running(vec![command(30.0, 0.2), command(45.0, 0.3)], 0));
+    assert!(told(&said, "auv3").contains(&&ToVehicle::Speed(command(45.0, 0.3))), "{said:?}");
+    assert!(matches!(recorded(&said)[..], [Record::Speed(row)] if row.speed == 0.3), "{said:?}");
+}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use common::mission::{Mission, digest};
 use common::time::Time;
-use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, Phase, ToVehicle};
+use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, Phase, SpeedCommand, ToVehicle};
 
 use super::{Hub, HubOutput, Known, Load};
 
@@ -65,17 +65,32 @@ impl Hub {
             FromVehicle::Ended { phase, reason } => {
                 if let Some(known) = self.vehicles.get_mut(id) {
                     known.phase = phase;
-                    known.reason = reason;
+                    known.reason.clone_from(&reason);
                 }
-                if phase == Phase::Aborted
-                    && self.load.as_ref().is_some_and(|l| l.phase == Phase::Running && l.lockstep.is_some())
-                {
-                    self.stop(now, &format!("{id} aborted a stepped run, which needs every vehicle"));
+                if phase == Phase::Aborted {
+                    self.aborted(now, id, &reason);
                 }
             }
             FromVehicle::Log(piece) => {
                 self.collected(id, piece);
             }
+        }
+    }
+
+    /// A vehicle cannot go on: the others do if time is real, until none is left.
+    fn aborted(&mut self, now: Time, id: &str, reason: &str) {
+        let Some(load) = self.load.as_ref().filter(|load| load.phase == Phase::Running) else { return };
+        if load.mission.index_of(id).is_none() {
+            return;
+        }
+        if load.lockstep.is_some() {
+            return self.stop(now, &format!("{id} aborted a stepped run, which needs every vehicle"));
+        }
+        let is_out = |id: &str| self.vehicles.get(id).is_some_and(|known| known.phase == Phase::Aborted);
+        let nobody_flies = load.mission.vehicles.iter().all(|vehicle| is_out(&vehicle.id));
+        self.note(now, &format!("{id} aborted: {reason}"));
+        if nobody_flies {
+            self.stop(now, "no vehicle flies any more");
         }
     }
 
@@ -97,15 +112,40 @@ impl Hub {
         }
         match (&self.load, flight) {
             (None, Some(flight)) => self.adopt(id, phase, flight),
+            // Mission-control came to a hub without memory before this vehicle did.
+            (Some(load), Some(flight))
+                if !self.flown && phase == Phase::Running && load.phase == Phase::Armed && same(load, &flight) =>
+            {
+                self.adopt(id, phase, flight);
+            }
+            (Some(load), Some(flight)) if phase == Phase::Running && self.flown && is_another(load, &flight) => {
+                let arms = matches!(load.phase, Phase::Armed | Phase::Running) && load.mission.index_of(id).is_some();
+                self.say(format!("{id} is still in a flight that is over: stopped"));
+                self.tell_vehicle(id, ToVehicle::Stop);
+                if arms {
+                    self.arm(id);
+                }
+            }
             (Some(load), Some(flight)) if same(load, &flight) && phase != Phase::Armed => {
                 // It has flown on alone; tell it what it missed.
-                for command in load.speeds.clone() {
+                self.learn(&flight.speeds);
+                for command in self.load.as_ref().map_or(Vec::new(), |load| load.speeds.clone()) {
                     self.tell_vehicle(id, ToVehicle::Speed(command));
                 }
             }
             (Some(load), _) if load.mission.index_of(id).is_some() => self.arm(id),
             _ => {}
         }
+    }
+
+    /// Speeds that a vehicle knows of and a hub that was killed since does not, nor perhaps the other vehicles.
+    fn learn(&mut self, speeds: &[SpeedCommand]) {
+        let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else { return };
+        let news: Vec<SpeedCommand> = speeds.iter().copied().filter(|command| !load.speeds.contains(command)).collect();
+        load.speeds.extend(&news);
+        load.speeds.sort_by_key(|command| command.at);
+        news.iter().for_each(|command| self.tell_fleet(&ToVehicle::Speed(*command)));
+        self.record_speeds(&news);
     }
 
     /// After a restart: the vehicles know what the hub has forgotten.
@@ -151,5 +191,15 @@ impl Hub {
             }
             self.note(now, &format!("{id} joins the flight under way"));
         }
+    }
+}
+
+/// Whether a vehicle under way is in another flight than the fleet: it missed that its own was ended.
+fn is_another(load: &Load, flight: &FlightPlan) -> bool {
+    match load.phase {
+        Phase::Running | Phase::Finished => {
+            load.clock != Some(flight.clock) || load.mission.digest != digest(&flight.mission)
+        }
+        Phase::Idle | Phase::Armed | Phase::Aborted => true,
     }
 }
