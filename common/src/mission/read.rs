@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use toml::de::DeTable;
 
 use super::fault::{Collector, Faults};
+use super::mend::{WAYS, mended};
 use super::shape::check_shape;
 
 /// Reads a file; `check` notes what its shape alone does not tell. `name` is what the faults call the file.
@@ -15,38 +16,53 @@ use super::shape::check_shape;
 pub fn read<T: DeserializeOwned + JsonSchema>(
     name: &str,
     text: &str,
-    check: impl FnOnce(&mut Collector<'_>, &T),
+    check: impl Fn(&mut Collector<'_>, &T),
 ) -> Result<T, Faults> {
-    let mut faults = Collector::new(text);
-    let file = shaped(&mut faults, text);
-    if let Some(file) = &file {
-        check(&mut faults, file);
-    }
-    match file {
-        Some(file) if faults.is_empty() => Ok(file),
-        _ => Err(faults.into_faults(name)),
-    }
+    examine(name, text, |faults, file| {
+        check(faults, &file);
+        Some(file)
+    })
 }
 
-/// The file as far as its shape goes; `None` only with a fault noted. With faults in values that serde tolerates (unknown
-/// keys) there is a file all the same, so that they are reported together with what is wrong with the values.
-pub(super) fn shaped<T: DeserializeOwned + JsonSchema>(faults: &mut Collector<'_>, text: &str) -> Option<T> {
-    match DeTable::parse(text) {
-        Err(error) => {
+/// Reads a file and makes something of it, or says everything that is wrong: with its shape and, as far as that can be told,
+/// with its values. `make` gives `None` only with a fault noted.
+///
+/// # Errors
+/// Everything that is wrong with it.
+pub(super) fn examine<T: DeserializeOwned + JsonSchema, R>(
+    name: &str,
+    text: &str,
+    make: impl Fn(&mut Collector<'_>, T) -> Option<R>,
+) -> Result<R, Faults> {
+    let mut faults = Collector::new(text);
+    let (root, errors) = DeTable::parse_recoverable(text);
+    if !errors.is_empty() {
+        // What is left of a text that is no TOML means little.
+        for error in errors {
             faults.fault_at(error.span().map(|span| span.start), String::new(), error.message().to_string());
-            return None;
         }
-        Ok(table) => check_shape::<T>(faults, table.get_ref()),
+        return Err(faults.into_faults(name));
+    }
+    let misfits = check_shape::<T>(&mut faults, root.get_ref());
+    if !misfits.none() {
+        let ways = (0..WAYS).filter_map(|way| {
+            let file = mended(root.get_ref(), &misfits, way).try_into().ok()?;
+            let mut faults = Collector::new(text);
+            make(&mut faults, file);
+            Some(faults.into_list())
+        });
+        faults.add_common(ways.collect());
+        return Err(faults.into_faults(name));
     }
     match toml::from_str(text) {
-        Ok(file) => Some(file),
+        Ok(file) => match make(&mut faults, file) {
+            Some(made) if faults.is_empty() => Ok(made),
+            _ => Err(faults.into_faults(name)),
+        },
+        // The shape check let something pass.
         Err(error) => {
-            // The shape check explains it better, unless it let something pass.
-            if faults.is_empty() {
-                let byte = error.span().map(|span| span.start);
-                faults.fault_at(byte, String::new(), error.message().to_string());
-            }
-            None
+            faults.fault_at(error.span().map(|span| span.start), String::new(), error.message().to_string());
+            Err(faults.into_faults(name))
         }
     }
 }
@@ -73,7 +89,10 @@ mod tests {
         assert_eq!(faults("eggs = 2"), "Recipe { eggs: 2 }");
         assert_eq!(faults("\neggs = 9"), "cake.toml:2: eggs: found 9; allowed: at most 2");
         assert_eq!(faults("eggs = 1\nsalt = 1"), "cake.toml:2: salt: found an unknown key; allowed: eggs");
-        assert_eq!(faults("eggs = \"two\""), "cake.toml:1: eggs: found a string; allowed: How many");
+        assert_eq!(
+            faults("eggs = \"two\""),
+            "cake.toml:1: eggs: found a string; allowed: an integer from -9223372036854775808 to 9223372036854775807: How many"
+        );
         assert!(faults("eggs = = 1").starts_with("cake.toml:1: found "));
     }
 }
