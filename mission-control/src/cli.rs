@@ -150,7 +150,7 @@ enum What {
     },
     /// End the flight under way
     #[command(
-        after_help = "Example:\n  mission-control stop --attach tcp/127.0.0.1:7447\n\nExit codes: 0 stopped, 1 there is no flight to stop, 3 the fleet cannot be reached."
+        after_help = "Example:\n  mission-control stop --attach tcp/127.0.0.1:7447\n\nExit codes: 0 stopped, 1 the fleet refused it, 3 the fleet cannot be reached."
     )]
     Stop {
         #[command(flatten)]

@@ -110,6 +110,10 @@ fn the_help_of_each_command_has_an_example_and_its_exit_codes() {
         let help = ground.controlled(0, &[name, "--help"]);
         assert!(help.contains(&format!("Example:\n  mission-control {name}")), "{help}");
         assert!(help.contains("Exit codes: 0 "), "{help}");
+        let files = help.split_whitespace().filter(|word| word.starts_with("missions/") || word.starts_with("tests/"));
+        for file in files {
+            assert!(in_repository(file).exists(), "{file} in the help of {name}");
+        }
     }
 }
 
@@ -124,7 +128,10 @@ fn numbers_beyond_sense_are_warned_of_or_refused_and_no_report_has_one() {
     assert!(said.contains("warning: coordination.law: a control period of 0.05 s"), "{said}");
     let page = fs::read_to_string(ground.path("steep/report.html")).expect("a report");
     let words = |text: &str| text.split(|c: char| !c.is_alphanumeric()).any(|word| word == "NaN" || word == "inf");
-    assert!(!words(&page) && !words(&control.stdout()), "{}", control.stdout());
+    let told = control.stdout();
+    assert!(!words(&page) && !words(&told), "{told}");
+    let longest = |text: &str| text.split(|c: char| !c.is_ascii_digit()).map(str::len).max();
+    assert!(longest(&told) < Some(30), "no number of a hundred digits: {told}");
 
     ground.file("far.toml", &with(&text, "x_m = 5.0, y_m = -15.0", "x_m = 5e200, y_m = -15.0"));
     let mut control = ground.control(&["check", "far.toml"]);
@@ -237,6 +244,30 @@ fn a_start_that_fails_leaves_no_empty_folder_and_names_no_source() {
     let said = control.stderr();
     assert!(said.contains(&endpoint) && !said.contains(".rs") && !said.contains("Single("), "{said}");
     assert!(!ground.path("attached").exists());
+}
+
+// --- a flight under way --------------------------------------------------------------------------------------------------
+
+#[test]
+fn who_joins_a_flight_is_told_that_its_speed_stays() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &short("60.0"));
+    let (_emulator, endpoint) = ground.emulator("tcp/127.0.0.1:0");
+    let _vehicles = ["auv1", "auv2", "auv3"].map(|id| ground.vehicle(id, &endpoint));
+    let run = |speed_up: &str, out: &str| {
+        ground.control(&["run", "mission.toml", "--attach", &endpoint, "--speed-up", speed_up, "--out", out])
+    };
+    let mut first = run("4", "first");
+    until(PATIENCE, "it flies", || first.stderr().contains("flying: "));
+    assert!(!first.stderr().contains("under way already"), "{}", first.stderr());
+    first.kill();
+    let mut second = run("50", "second");
+    second.ends_with(0);
+    let said = second.stderr();
+    assert!(said.contains("it goes on at the speed it was started with, and --speed-up 50 changes nothing"), "{said}");
+    let host = ground.json("second/host.json");
+    assert_eq!(host["how"], "mission-control run --attach to a flight under way");
+    assert!(host["speed_up"].is_null(), "{host:#}");
 }
 
 // --- the README ----------------------------------------------------------------------------------------------------------

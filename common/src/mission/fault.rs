@@ -136,11 +136,11 @@ impl<'t> Collector<'t> {
         }
     }
 
-    /// Notes the faults that are in all of these lists.
-    pub(super) fn add_common(&mut self, lists: Vec<Vec<Fault>>) {
+    /// Notes the faults that are in all of these lists, of such keys.
+    pub(super) fn add_common(&mut self, lists: Vec<Vec<Fault>>, of: impl Fn(&str) -> bool) {
         let Some((first, others)) = lists.split_first() else { return };
         let common = first.iter().filter(|fault| others.iter().all(|list| list.contains(fault)));
-        for fault in common {
+        for fault in common.filter(|fault| of(&fault.key)) {
             if !self.list.contains(fault) {
                 self.list.push(fault.clone());
             }
@@ -152,9 +152,13 @@ impl<'t> Collector<'t> {
     }
 
     /// Notes a fault at a byte of the file, as the parser reports it.
-    pub(super) fn fault_at(&mut self, byte: Option<usize>, key: String, found: String) {
+    pub(super) fn fault_at(&mut self, byte: Option<usize>, found: String, allowed: String) {
         let line = byte.map_or(0, |byte| self.locator.line_of_byte(byte));
-        self.list.push(Fault { line, key, found, allowed: String::new() });
+        self.list.push(Fault { line, key: String::new(), found, allowed });
+    }
+
+    pub(super) fn line_of_byte(&self, byte: usize) -> usize {
+        self.locator.line_of_byte(byte)
     }
 
     /// Notes a fault unless the number is finite and `ok`.

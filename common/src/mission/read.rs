@@ -38,9 +38,7 @@ pub(super) fn examine<T: DeserializeOwned + JsonSchema, R>(
     let (root, errors) = DeTable::parse_recoverable(text);
     if !errors.is_empty() {
         // What is left of a text that is no TOML means little.
-        for error in errors {
-            faults.fault_at(error.span().map(|span| span.start), String::new(), error.message().to_string());
-        }
+        no_toml(&mut faults, &errors);
         return Err(faults.into_faults(name));
     }
     let misfits = check_shape::<T>(&mut faults, root.get_ref());
@@ -51,7 +49,7 @@ pub(super) fn examine<T: DeserializeOwned + JsonSchema, R>(
             make(&mut faults, file);
             Some(faults.into_list())
         });
-        faults.add_common(ways.collect());
+        faults.add_common(ways.collect(), |key| !misfits.made_up(key));
         return Err(faults.into_faults(name));
     }
     match toml::from_str(text) {
@@ -61,9 +59,33 @@ pub(super) fn examine<T: DeserializeOwned + JsonSchema, R>(
         },
         // The shape check let something pass.
         Err(error) => {
-            faults.fault_at(error.span().map(|span| span.start), String::new(), error.message().to_string());
+            faults.fault_at(error.span().map(|span| span.start), error.message().to_string(), String::new());
             Err(faults.into_faults(name))
         }
+    }
+}
+
+/// Where a text is no TOML. The parser goes on after an error as well as it can: of a line only its first complaint counts, and keys that
+/// are there twice only if nothing before them can have mixed up the tables.
+fn no_toml(faults: &mut Collector<'_>, errors: &[toml::de::Error]) {
+    let mut mixed_up = false;
+    let mut line_before = None;
+    for error in errors {
+        let byte = error.span().map(|span| span.start);
+        let line = byte.map(|byte| faults.line_of_byte(byte));
+        let is_duplicate = error.message().starts_with("duplicate key");
+        let is_new = line.is_none() || line != line_before;
+        if is_new && !(is_duplicate && mixed_up) {
+            let (found, allowed) = match error.message().split_once(", expected ") {
+                Some((found, "nothing")) => (found, ""),
+                Some((found, allowed)) => (found, allowed),
+                None if is_duplicate => ("duplicate key", "each key once"),
+                None => (error.message(), ""),
+            };
+            faults.fault_at(byte, found.to_string(), allowed.to_string());
+        }
+        mixed_up |= !is_duplicate;
+        line_before = line;
     }
 }
 
@@ -92,6 +114,12 @@ mod tests {
         assert_eq!(
             faults("eggs = \"two\""),
             "cake.toml:1: eggs: found a string; allowed: an integer from -9223372036854775808 to 9223372036854775807: How many"
+        );
+        assert_eq!(faults("eggs = 1\neggs = 2"), "cake.toml:2: found duplicate key; allowed: each key once");
+        assert_eq!(
+            faults("[a\neggs = 1\nflour 2\neggs = 1"),
+            "cake.toml:1: found unclosed table; allowed: `]`\n\
+             cake.toml:3: found key with no value; allowed: `=`"
         );
         assert!(faults("eggs = = 1").starts_with("cake.toml:1: found "));
     }

@@ -36,14 +36,22 @@ pub(super) struct Misfits {
     pub(super) schema: Value,
     /// Keys whose values cannot be read.
     pub(super) unreadable: HashSet<String>,
-    /// Whether a key is missing somewhere.
-    pub(super) incomplete: bool,
+    /// Keys that are missing.
+    missing: Vec<String>,
 }
 
 impl Misfits {
     /// Whether all can be read; unknown keys are faults, but in nobody's way.
     pub(super) fn none(&self) -> bool {
-        self.unreadable.is_empty() && !self.incomplete
+        self.unreadable.is_empty() && self.missing.is_empty()
+    }
+
+    /// Whether a key is one of those whose value has to be made up, or below one.
+    pub(super) fn made_up(&self, key: &str) -> bool {
+        let below = |of: &String| {
+            key.strip_prefix(of.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        self.unreadable.iter().chain(&self.missing).any(below)
     }
 }
 
@@ -63,7 +71,7 @@ impl Look<'_, '_> {
             }
         }
         for required in required(schema).filter(|name| !found.contains_key(*name)) {
-            self.misfits.incomplete = true;
+            self.misfits.missing.push(join(key, required));
             self.faults.fault(key, format!("no {required}"), describe(&properties[required]));
         }
     }
@@ -106,7 +114,8 @@ impl Look<'_, '_> {
             let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
             let count = array.len() as u64;
             if least.is_some_and(|least| count < least) || most.is_some_and(|most| count > most) {
-                self.unreadable(key, format!("{count} values"), format!("{} values", least.or(most).unwrap_or(0)));
+                let values = |count: u64| format!("{count} value{}", if count == 1 { "" } else { "s" });
+                self.unreadable(key, values(count), values(least.or(most).unwrap_or(0)));
             }
             for (i, item) in array.iter().enumerate() {
                 self.check(item.get_ref(), &schema["items"], &format!("{key}[{i}]"));

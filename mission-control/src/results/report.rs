@@ -172,7 +172,7 @@ fn theory(page: &mut String, rows: &[TheoryRow]) {
             None => "–",
         };
         let text =
-            [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(told(text)));
+            [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(&told(text)));
         let [name, condition, value, predicted, measured] = text;
         vec![name, condition, value, holds.into(), predicted, measured]
     });
@@ -415,11 +415,21 @@ pub(crate) fn escape(text: &str) -> String {
     escaped
 }
 
-/// What is fit to be told to a person: a text with a number in it that is none says nothing.
-pub(crate) fn told(text: &str) -> &str {
+/// What is fit to be told to a person: a text with a number in it that is none says nothing, and none has a hundred digits.
+pub(crate) fn told(text: &str) -> String {
     let is_none = |word: &str| ["NaN", "nan", "inf"].contains(&word);
-    if text.split(|c: char| !c.is_alphanumeric()).any(is_none) { "–" } else { text }
+    if text.split(|c: char| !c.is_alphanumeric()).any(is_none) {
+        return "–".into();
+    }
+    let short = |word: &str| match word.parse::<f64>() {
+        Ok(value) if word.len() > MOST_DIGITS => format!("{value:.3e}"),
+        _ => word.to_owned(),
+    };
+    text.split(' ').map(short).collect::<Vec<_>>().join(" ")
 }
+
+/// A number with more characters than this is better written with a power of ten.
+const MOST_DIGITS: usize = 24;
 
 /// The path-following error at the end, with the instant if the vehicle did not last.
 fn at_end(vehicle: &VehicleSummary, duration_s: f64) -> String {
@@ -526,6 +536,7 @@ mod tests {
             assert!(!page.contains(text), "{text}");
         }
         assert_eq!(told("information from infinity"), "information from infinity");
+        assert_eq!(told(&format!("{:.5} 1/s, 0.25 m", -1.5e137)), "-1.500e137 1/s, 0.25 m");
     }
 
     #[test]

@@ -286,7 +286,8 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         connectivity: network.connectivity(facts),
         coordination: coordination_summary(&coordination, facts),
     };
-    let warnings = warnings(recording, &vehicles, &links, facts.duration_s);
+    let end_s = largest(vehicles.iter().filter_map(|vehicle| vehicle.last_s));
+    let warnings = warnings(recording, &vehicles, &links, end_s);
     Summary {
         format: 1,
         mission: facts.mission.clone(),
@@ -444,7 +445,7 @@ fn totals(links: &[LinkSummary], said: &BTreeMap<&str, u64>, facts: &Facts) -> M
     }
 }
 
-fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSummary], duration_s: f64) -> Vec<String> {
+fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSummary], end_s: f64) -> Vec<String> {
     let mut warnings = Vec::new();
     if !recording.complete {
         let how = recording.damage.as_ref().map_or(String::new(), |damage| format!(" ({damage})"));
@@ -453,7 +454,7 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
     for vehicle in vehicles.iter().filter(|vehicle| vehicle.rows == 0) {
         warnings.push(format!("{} has no rows: it is not part of the fleet's numbers.", vehicle.id));
     }
-    for (vehicle, at) in vehicles.iter().filter_map(|vehicle| Some((vehicle, vehicle.early(duration_s)?))) {
+    for (vehicle, at) in vehicles.iter().filter_map(|vehicle| Some((vehicle, vehicle.early(end_s)?))) {
         warnings
             .push(format!("{} recorded nothing after {at} s: its numbers at the end are of that instant.", vehicle.id));
     }

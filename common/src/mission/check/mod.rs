@@ -386,11 +386,26 @@ mod tests {
             ("law = { delayed_with_losses", "law = { delayed_with_loses", "coordination.law.delayed_with_loses: "),
             ("{ underactuated_auv = \"sirene\" }", "\"submarine\"", "fleet.model: found \"submarine\"; "),
             ("start = { x_m = 5.0, y_m = -10.0, z_m = -5.0 }", "", "vehicles[0]: found no start; "),
+            ("[[\"auv1\", \"auv2\"], ", "[[\"auv1\"], ", "network.links[0]: found 1 value; allowed: 2 values"),
+            ("path = { helix = ", "path = { spiral = ", "vehicles[0].path.spiral: found \"spiral\"; allowed: chain, "),
             ("duration_s = 800.0", "duration_s = 1e999", "duration_s: found 1e999; allowed: a number: "),
             ("seed = 1", "seed = 99999999999999999999999999", "seed: found a number of 26 digits; "),
         ] {
             let found = faults_with(old, new);
             assert!(found.len() == 1 && found[0].contains(key), "{new}: {found:#?}");
+        }
+    }
+
+    #[test]
+    fn what_is_made_up_is_not_blamed() {
+        let begin = HELIX.find("[[vehicles]]").expect("vehicles");
+        for vehicles in ["", "vehicles = 3\n"] {
+            let text = format!("{vehicles}{}", &HELIX[..begin].replace("gain = 0.1", "gain = 0.0"));
+            let found = faults(&text);
+            let expected = if vehicles.is_empty() { "found no vehicles; " } else { "vehicles: found an integer; " };
+            assert!(found.iter().any(|line| line.contains(expected)), "{found:#?}");
+            assert!(found.iter().any(|line| line.contains("delayed_with_losses: found ")), "{found:#?}");
+            assert_eq!(found.len(), 2, "{found:#?}");
         }
     }
 
