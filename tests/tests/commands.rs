@@ -282,6 +282,16 @@ fn snippet(language: &str, part: &str) -> String {
 }
 
 #[test]
+fn the_rows_that_the_readme_counts_are_there() {
+    let ground = Ground::new();
+    let mission = in_repository("missions/auv-helix.toml");
+    ground.controlled(0, &["simulate", mission.to_str().expect("plain"), "--out", "simulated"]);
+    let said = ground.controlled(0, &["diff", "simulated", "simulated"]);
+    let readme = fs::read_to_string(in_repository("README.md")).expect("the README");
+    assert!(readme.contains(&format!("The last says `{}`", said.trim_end())), "{said}");
+}
+
+#[test]
 fn the_python_of_the_readme_prints_what_it_says() {
     let python = |arguments: &[&str]| Command::new("python3").args(arguments).output();
     if !python(&["--version"]).is_ok_and(|output| output.status.success()) {

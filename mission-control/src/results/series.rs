@@ -209,10 +209,11 @@ mod tests {
     fn a_series_is_broken_where_a_vehicle_was_away_and_not_where_a_row_is_missing() {
         let facts = Facts { control_period_s: 0.05, ..Facts::default() };
         let missing_one = [0.0, 0.5, 1.0, 2.0, 2.5];
-        assert_eq!(unbroken(&missing_one, &facts), [0..5]);
+        let whole = unbroken(&missing_one, &facts);
+        assert_eq!((whole.len(), &whole[0]), (1, &(0..5)));
         let away = [0.0, 0.5, 1.0, 90.0, 90.5, 91.0];
         assert_eq!(unbroken(&away, &facts), [0..3, 3..6]);
-        assert_eq!(unbroken(&[], &facts), [0..0; 0]);
+        assert!(unbroken(&[], &facts).is_empty());
     }
 
     #[test]
