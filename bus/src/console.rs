@@ -8,9 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use tracing_subscriber::EnvFilter;
 
+/// What is logged unless `RUST_LOG` says otherwise. Zenoh's own lines are left out: what fails comes back to the program as an
+/// error, which says it in the user's words, and what is left is how its sessions part, such as an `ERROR` about a message
+/// that was under way when the other end closed.
+const USUAL: &str = "info,zenoh=off";
+
 /// Log lines go to stderr, `info` and above (`RUST_LOG` changes that), with colour on a terminal only.
 pub fn init_log() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(USUAL));
     let _ = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_target(false)
@@ -20,10 +25,22 @@ pub fn init_log() {
         .try_init();
 }
 
-/// Writes to stdout. That nobody reads it (a closed pipe, a full disk) is no reason to fall over.
+/// Whether something that was to be read from stdout got lost.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// Writes to stdout. That it cannot be written is no reason to fall over; [`lost`] tells.
 pub fn write_out(text: fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
-    let _ = out.write_fmt(text).and_then(|()| out.flush());
+    // A reader that has read enough and closed its pipe has lost nothing.
+    let written = out.write_fmt(text).and_then(|()| out.flush());
+    if written.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe) {
+        LOST.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Whether something that was to be read from stdout got lost, on a full disk for instance.
+pub fn lost() -> bool {
+    LOST.load(Ordering::Relaxed)
 }
 
 /// Writes to stderr, likewise.
@@ -102,9 +119,33 @@ impl Parent {
     }
 }
 
+/// The operating system and its release.
+pub fn system() -> String {
+    let uname = rustix::system::uname();
+    let parts = [uname.sysname(), uname.release(), uname.machine()].map(|part| part.to_string_lossy().into_owned());
+    parts.join(" ")
+}
+
 /// The host's name as a vehicle's name: lower case, and a dash for what may not be in one.
 pub fn host_name() -> String {
     let uname = rustix::system::uname();
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
     uname.nodename().to_string_lossy().chars().map(plain).take(32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::str::FromStr;
+
+    use tracing_subscriber::filter::{Directive, LevelFilter};
+
+    use super::*;
+
+    #[test]
+    fn zenoh_is_silent_and_the_programs_are_not() {
+        let filter = EnvFilter::new(USUAL).to_string();
+        assert!(filter.contains("zenoh=off") && filter.contains("info"), "{filter}");
+        assert_eq!(EnvFilter::new(USUAL).max_level_hint(), Some(LevelFilter::INFO));
+        assert!(Directive::from_str("zenoh=off").is_ok());
+    }
 }

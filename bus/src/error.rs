@@ -60,8 +60,27 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
     pub(crate) fn middleware(error: impl fmt::Display) -> Error {
-        Error::Middleware(error.to_string())
+        Error::Middleware(plainly(&error.to_string()))
     }
+}
+
+/// What the middleware says, without the places in its own sources, which mean nothing at a terminal.
+fn plainly(text: &str) -> String {
+    if text.starts_with("Unable to connect to any of") {
+        return "no session could be opened with what listens there".to_owned();
+    }
+    let mut words: Vec<&str> = Vec::new();
+    for word in text.split_whitespace() {
+        let is_place = word.starts_with('/') && word.contains(".rs:");
+        match (is_place, words.last()) {
+            (false, _) => words.push(word),
+            (true, Some(&"at")) => {
+                words.pop();
+            }
+            (true, _) => {}
+        }
+    }
+    words.join(" ").trim_end_matches(['.', '!', ' ']).to_owned()
 }
 
 impl fmt::Display for Error {
@@ -91,3 +110,26 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_middleware_says_names_no_source() {
+        for (said, told) in [
+            (
+                "Unable to connect to any of [Single(tcp/127.0.0.1:7447)]! at /root/.cargo/registry/src/x/orchestrator.rs:447.",
+                "no session could be opened with what listens there",
+            ),
+            (
+                "Can not create a listener: address in use at /home/a/.cargo/registry/src/x/unicast.rs:352. - Caused by y at \
+                 /b/net.rs:7.",
+                "Can not create a listener: address in use - Caused by y",
+            ),
+            ("the disk is full", "the disk is full"),
+        ] {
+            assert_eq!(Error::middleware(said), Error::Middleware(told.to_owned()));
+        }
+    }
+}

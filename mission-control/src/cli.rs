@@ -15,7 +15,8 @@ use common::wire::vehicle::Phase;
 
 use crate::console::{Count, Progress};
 use crate::gallery::{GALLERY, Gallery};
-use crate::results::{Summary, TheoryRow, diff, export_csv, network_section};
+use crate::results::report::told;
+use crate::results::{Summary, TheoryRow, compare as compare_runs, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::measure::index_of;
 use crate::sweep::plan::{self, Plan as SweepPlan};
@@ -45,6 +46,9 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Check a mission file: what is wrong with it, or what theory says of it
+    #[command(
+        after_help = "Example:\n  mission-control check missions/auv-helix.toml\n\nExit codes: 0 it can be flown, 2 something is wrong with it, 4 figures or output cannot be written."
+    )]
     Check {
         /// The mission file
         mission: PathBuf,
@@ -56,6 +60,9 @@ enum What {
         figures: Option<PathBuf>,
     },
     /// Fly a mission in one thread, as fast as it goes
+    #[command(
+        after_help = "Example:\n  mission-control simulate missions/auv-helix.toml --set seed=7 --out runs/seven\n\nExit codes: 0 flown, 1 aborted, 2 a wrong mission, 4 files or output cannot be written."
+    )]
     Simulate {
         /// The mission file
         mission: PathBuf,
@@ -73,6 +80,9 @@ enum What {
         json: bool,
     },
     /// Fly a mission with every combination of some values, each several times, and sum up what came of it
+    #[command(
+        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 5\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, 4 files cannot be read or written."
+    )]
     Sweep {
         /// The mission file
         mission: PathBuf,
@@ -91,6 +101,9 @@ enum What {
         out: Option<PathBuf>,
     },
     /// Fly the sweeps of a study and write its page
+    #[command(
+        after_help = "Example:\n  mission-control study missions/studies/loss-delay.toml\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong study, 4 files cannot be read or written."
+    )]
     Study {
         /// The study file
         study: PathBuf,
@@ -99,8 +112,14 @@ enum What {
         out: Option<PathBuf>,
     },
     /// Fly a mission as real processes: one per vehicle, one for the network between them
+    #[command(
+        after_help = "Example:\n  mission-control run missions/auv-helix.toml --speed-up 20\n\nExit codes: 0 flown (or left flying, with --attach), 1 aborted or refused, 2 a wrong mission, 3 the fleet cannot be reached,\n  4 files or output cannot be written."
+    )]
     Run(RunArgs),
     /// Fly all missions of a folder and show them on one page, with the numbers expected of them (exit code 1: one disagrees)
+    #[command(
+        after_help = "Example:\n  mission-control gallery missions/thesis --out runs/gallery\n\nExit codes: 0 all numbers agree, 1 one disagrees, 2 a wrong mission or gallery file, 4 files cannot be read or written."
+    )]
     Gallery {
         /// The folder: missions, and gallery.toml, which says what figures they make
         missions: PathBuf,
@@ -109,6 +128,9 @@ enum What {
         out: PathBuf,
     },
     /// Set the formation speed of the fleet under way
+    #[command(
+        after_help = "Example:\n  mission-control speed 0.4\n\nExit codes: 0 taken, 1 the fleet refused it, 3 the fleet cannot be reached."
+    )]
     Speed {
         /// The speed v_L (units of xi per s)
         #[arg(allow_negative_numbers = true)]
@@ -117,6 +139,9 @@ enum What {
         fleet: FleetArgs,
     },
     /// Tell how the fleet is
+    #[command(
+        after_help = "Example:\n  mission-control status --json\n\nExit codes: 0 told, 3 the fleet cannot be reached, 4 output cannot be written."
+    )]
     Status {
         /// JSON for a pipe
         #[arg(long)]
@@ -125,16 +150,25 @@ enum What {
         fleet: FleetArgs,
     },
     /// End the flight under way
+    #[command(
+        after_help = "Example:\n  mission-control stop --attach tcp/127.0.0.1:7447\n\nExit codes: 0 stopped, 1 the fleet refused it, 3 the fleet cannot be reached."
+    )]
     Stop {
         #[command(flatten)]
         fleet: FleetArgs,
     },
-    /// Make summary, figures and report of a run again
+    /// Make summary, figures and report of a run again; its recording too, if mission-control was killed
+    #[command(
+        after_help = "Example:\n  mission-control report runs/auv-helix-2026-01-31-120000\n\nExit codes: 0 made, 4 files cannot be read or written."
+    )]
     Report {
         /// The run folder
         run: PathBuf,
     },
     /// Write a run's recording in another format
+    #[command(
+        after_help = "Example:\n  mission-control export runs/auv-helix-2026-01-31-120000 --format csv --out csv\n\nExit codes: 0 written, 4 files cannot be read or written."
+    )]
     Export {
         /// The run folder, or a recording
         run: PathBuf,
@@ -146,15 +180,21 @@ enum What {
         out: Option<PathBuf>,
     },
     /// Compare two runs: equal, or the first message or state in which they part
+    #[command(
+        after_help = "Example:\n  mission-control diff runs/simulated runs/stepped\n\nExit codes: 0 equal, 1 different, or equal only as far as one goes that is cut off, 4 files cannot be read."
+    )]
     Diff {
         /// A run folder, or a recording
         a: PathBuf,
         /// Another
         b: PathBuf,
     },
-    /// Make a whole recording of one that was cut off
+    /// Make a whole recording of one that was cut off, or of the logs of a run that was killed
+    #[command(
+        after_help = "Example:\n  mission-control recover runs/killed\n  mission-control recover logs/auv1.mcap --out auv1.mcap\n\nExit codes: 0 made, 4 files cannot be read or written, or nothing could be saved."
+    )]
     Recover {
-        /// The recording that was cut off
+        /// The recording that was cut off, or the folder of a run whose mission-control was killed
         recording: PathBuf,
         /// The whole one (default: NAME-recovered.mcap beside it)
         #[arg(long, value_name = "FILE")]
@@ -163,10 +203,15 @@ enum What {
     /// Search the worst switching signal that brief connectivity losses admit, and save the mission with it
     #[command(
         after_help = "A signal is admitted if in every window of length t the vehicles are not connected for at most\n\
-        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3)."
+        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3).\n\n\
+        Example:\n  mission-control worst missions/talk/naive.toml --alpha 0.5 --t0 5 --dwell 1\n\n\
+        Exit codes: 0 found, 2 a wrong mission or number, 4 output cannot be written."
     )]
     Worst(WorstArgs),
     /// Print the lines of a GeoJSON file as paths in metres, to paste into a mission
+    #[command(
+        after_help = "Example:\n  mission-control waypoints lanes.geojson --origin=-9.13,38.69\n\nExit codes: 0 printed, 2 no GeoJSON, or no line in it, 4 output cannot be written."
+    )]
     Waypoints {
         /// The GeoJSON file
         file: PathBuf,
@@ -175,6 +220,9 @@ enum What {
         origin: Option<Place>,
     },
     /// Print the JSON schema of the mission file, for editors
+    #[command(
+        after_help = "Example:\n  mission-control schema > missions/mission.schema.json\n\nExit codes: 0 printed, 4 output cannot be written."
+    )]
     Schema,
     #[command(hide = true)]
     VehicleNode(vehicle_node::program::Args),
@@ -266,6 +314,10 @@ type Ended = Result<ExitCode, End>;
 /// Runs a command to its end.
 pub fn main(cli: Cli) -> ExitCode {
     match run(cli.command) {
+        Ok(_) if bus::console::lost() => {
+            bus::remark!("cannot write to standard output; what was to be told is lost");
+            ExitCode::from(4)
+        }
         Ok(code) => code,
         Err(End(code, reason)) => {
             bus::remark!("{reason}");
@@ -300,8 +352,9 @@ fn run(what: What) -> Ended {
     }
 }
 
+/// A mission that shall be flown.
 fn load(path: &Path) -> Result<Arc<Mission>, End> {
-    folder::load(path).map_err(|reason| End(2, reason))
+    folder::load(path).map_err(|reason| End(2, format!("{reason}; nothing was started")))
 }
 
 /// Longest GeoJSON file (bytes); of a longer one the begin is read, which is no GeoJSON.
@@ -316,7 +369,7 @@ fn read_bounded(path: &Path) -> std::io::Result<String> {
 }
 
 fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
-    let mission = load(path)?;
+    let mission = folder::load(path).map_err(|reason| End(2, reason))?;
     let rows = theory::rows(&mission, None);
     if json {
         let rows: Vec<_> = rows
@@ -343,7 +396,7 @@ fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
     if let Some(folder) = figures {
         draw(&mission, folder).map_err(|error| End(4, format!("cannot draw in {}: {error}", folder.display())))?;
     }
-    warn(&rows);
+    warn(&mission, &rows);
     Ok(ExitCode::SUCCESS)
 }
 
@@ -358,7 +411,10 @@ fn draw(mission: &Mission, folder: &Path) -> std::io::Result<()> {
 }
 
 /// A mission that violates a condition flies, with a warning that names it.
-fn warn(rows: &[TheoryRow]) {
+fn warn(mission: &Mission, rows: &[TheoryRow]) {
+    for text in mission.advice() {
+        bus::remark!("warning: {text}");
+    }
     for row in rows.iter().filter(|row| row.holds == Some(false)) {
         let here = if row.value.is_empty() { String::new() } else { format!("; here: {}", row.value) };
         bus::remark!("warning: not covered by theory: {}: needs {}{here}", row.name, row.condition);
@@ -380,6 +436,7 @@ fn print_theory(rows: &[TheoryRow]) {
             ("measured", &row.measured),
         ];
         for (label, text) in lines {
+            let text = told(text);
             if !text.is_empty() && text != "–" {
                 bus::tell!("      {label:<9} {text}");
             }
@@ -389,7 +446,7 @@ fn print_theory(rows: &[TheoryRow]) {
 
 fn simulate(path: &Path, out: Option<&Path>, sets: &[String], seed: Option<u64>, json: bool) -> Ended {
     let mission = changed(load(path)?, sets, seed).map_err(|reason| End(2, reason))?;
-    warn(&theory::rows(&mission, None));
+    warn(&mission, &theory::rows(&mission, None));
     let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
     let sound = outcome.phase == Phase::Finished && outcome.aborted.is_empty();
     tell(&mission, &folder, outcome.phase, sound, &summary, json)
@@ -478,7 +535,7 @@ fn run_fleet(args: RunArgs) -> Ended {
     if !(args.speed_up.is_finite() && args.speed_up > 0.0 && args.speed_up <= 1000.0) {
         return Err(End(2, format!("--speed-up: found {}; allowed: above 0 and at most 1000", args.speed_up)));
     }
-    warn(&theory::rows(&mission, None));
+    warn(&mission, &theory::rows(&mission, None));
     let pace = if args.stepped { Pace::Stepped } else { Pace::Real { speed_up: args.speed_up } };
     let plan = Plan {
         mission: mission.clone(),
@@ -535,10 +592,24 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, sound: bool, summary: &S
             let (copied, dropped, in_flight) = (m.copied, m.copy_dropped, m.copy_in_flight);
             bus::tell!("  Second copies: {copied} delivered, {dropped} dropped, {in_flight} in flight");
         }
-        bus::tell!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
+        bus::tell!("  {}", coordination_at_end(summary));
         bus::tell!("report: {}", folder.join("report.html").display());
     }
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// The coordination error at the end of a flight, or what is known instead.
+fn coordination_at_end(summary: &Summary) -> String {
+    let coordination = &summary.fleet.coordination;
+    let value = match coordination.last.is_finite() {
+        true => format!("{:.2e}", coordination.last),
+        false => "beyond what can be told".to_string(),
+    };
+    match (coordination.last_s, coordination.early(summary.duration_s)) {
+        (None, _) => "Coordination error at the end: unknown, the vehicles were never recorded together".to_string(),
+        (_, Some(at)) => format!("Coordination error at {at} s, when all were last recorded: {value}"),
+        _ => format!("Coordination error at the end: {value}"),
+    }
 }
 
 fn ask(endpoint: &Endpoint, question: &ToFleet) -> Result<FromFleet, End> {
@@ -609,7 +680,11 @@ fn gallery(missions: &Path, out: &Path) -> Ended {
 }
 
 fn report(run: &Path) -> Ended {
-    folder::report(run).map_err(|error| End(4, error))?;
+    let notes = folder::salvage(run).map_err(|error| End(4, error))?.unwrap_or_default();
+    for text in &notes {
+        bus::remark!("{text}");
+    }
+    folder::report(run, notes).map_err(|error| End(4, error))?;
     bus::tell!("report: {}", run.join("report.html").display());
     Ok(ExitCode::SUCCESS)
 }
@@ -645,14 +720,10 @@ fn export(run: &Path, format: Format, out: Option<PathBuf>) -> Ended {
 fn compare(a: &Path, b: &Path) -> Ended {
     let left = folder::recording(a).map_err(|error| End(4, error))?;
     let right = folder::recording(b).map_err(|error| End(4, error))?;
-    let outcome = diff(&left, &right);
-    let whole = left.complete && right.complete;
-    bus::tell!("{outcome}");
-    Ok(if whole && matches!(outcome, crate::results::Outcome::Equal { .. }) {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(1)
-    })
+    let [name_a, name_b] = [a, b].map(|path| path.display().to_string());
+    let outcome = compare_runs(&left, &right, [&name_a, &name_b]);
+    bus::tell!("{}", outcome.text);
+    Ok(if outcome.equal { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn search(args: &WorstArgs) -> Ended {
@@ -707,6 +778,9 @@ fn search(args: &WorstArgs) -> Ended {
 }
 
 fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
+    if path.is_dir() {
+        return recover_run(path, out);
+    }
     let out = out.unwrap_or_else(|| {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         path.with_file_name(format!("{stem}-recovered.mcap"))
@@ -715,6 +789,31 @@ fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
     if recovered.rows == 0 {
         return Err(End(4, format!("{} holds no row that could be saved", path.display())));
     }
+    if let Some(damage) = &recovered.damage {
+        bus::remark!("warning: {} is damaged, and what is damaged is left out: {damage}", path.display());
+    }
     bus::tell!("{} rows to {}", recovered.rows, out.display());
     Ok(ExitCode::SUCCESS)
+}
+
+/// Makes the recording of a run whose mission-control was killed, of the logs of its processes.
+fn recover_run(run: &Path, out: Option<PathBuf>) -> Ended {
+    if out.is_some() {
+        return Err(End(2, "--out: found with a run folder; allowed: with a recording".to_string()));
+    }
+    let recording = run.join(folder::RECORDING);
+    match folder::salvage(run).map_err(|error| End(4, error))? {
+        Some(notes) => {
+            for text in &notes {
+                bus::remark!("{text}");
+            }
+            bus::tell!("merged to {}; next: mission-control report {}", recording.display(), run.display());
+            Ok(ExitCode::SUCCESS)
+        }
+        None if recording.exists() => {
+            bus::tell!("{} is there already", recording.display());
+            Ok(ExitCode::SUCCESS)
+        }
+        None => Err(End(4, format!("{} holds no logs of a run of its own that could be merged", run.display()))),
+    }
 }

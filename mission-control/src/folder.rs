@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use bus::recording::{Recording, read};
+use bus::recording::{Merged, Recording, merge, read};
 use common::mission::Mission;
 use common::record::Record;
 use common::time::Time;
@@ -40,7 +40,7 @@ pub fn load(path: &Path) -> Result<Arc<Mission>, String> {
     }
     Mission::parse(&path.display().to_string(), &text).map(Arc::new).map_err(|faults| {
         let n = faults.list.len();
-        format!("{faults}\n{n} fault{} in {}; nothing was started", if n == 1 { "" } else { "s" }, path.display())
+        format!("{faults}\n{n} fault{} in {}", if n == 1 { "" } else { "s" }, path.display())
     })
 }
 
@@ -79,10 +79,24 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
 pub struct HostFacts {
     /// `simulate`, `run --stepped`, `run`, ...
     pub how: String,
+    /// The command, as it was given.
+    pub command: Vec<String>,
+    /// Mission seconds per second of wall clock; `None` for as fast as it goes.
+    pub speed_up: Option<f64>,
     /// Version of mission-control.
     pub version: String,
+    /// Version of the compiler that made it.
+    pub rustc: String,
+    /// Version of the middleware.
+    pub zenoh: String,
     /// The host's name.
     pub host: String,
+    /// The operating system and its release.
+    pub os: String,
+    /// The processor.
+    pub cpu: String,
+    /// How many of it there are for this process.
+    pub cores: usize,
     /// When the folder was written, UTC.
     pub written: String,
     /// Seconds of wall clock the flight took.
@@ -97,17 +111,31 @@ pub struct HostFacts {
 
 impl HostFacts {
     /// Facts of now.
-    pub fn now(how: &str, wall_s: f64, missing: Vec<String>, aborted: Vec<String>) -> HostFacts {
+    pub fn now(how: &str, speed_up: Option<f64>, wall_s: f64, missing: Vec<String>, aborted: Vec<String>) -> HostFacts {
         HostFacts {
             how: how.to_string(),
+            command: std::env::args().collect(),
+            speed_up,
             version: env!("CARGO_PKG_VERSION").to_string(),
+            rustc: env!("CPF_RUSTC").to_string(),
+            zenoh: env!("CPF_ZENOH").to_string(),
             host: bus::console::host_name(),
+            os: bus::console::system(),
+            cpu: cpu(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
             written: utc_stamp(SystemTime::now()),
             wall_s,
             missing,
             aborted,
         }
     }
+}
+
+/// The processor's name, as Linux tells it; its architecture where it does not.
+fn cpu() -> String {
+    let told = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    name.map_or_else(|| std::env::consts::ARCH.to_string(), |(_, name)| name.trim().to_string())
 }
 
 /// Writes summary, figures and report of the recording in a run folder.
@@ -117,14 +145,14 @@ impl HostFacts {
 pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
     write(&folder.join(HOST), &json)?;
-    report(folder)
+    report(folder, Vec::new())
 }
 
 /// Writes summary, figures and report of the recording in a run folder, again if need be.
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn report(folder: &Path) -> Result<Summary, String> {
+pub fn report(folder: &Path, mut notes: Vec<String>) -> Result<Summary, String> {
     let recording = recording(folder)?;
     let mission = Mission::parse(MISSION, &recording.mission_toml).map_err(|faults| faults.to_string())?;
     // A flight that was ended early is measured over what was flown.
@@ -134,13 +162,105 @@ pub fn report(folder: &Path) -> Result<Summary, String> {
     facts.duration_s = end.secs();
     // A recording by itself has no host facts beside it.
     let host = fs::read(folder.join(HOST)).ok().and_then(|json| serde_json::from_slice::<HostFacts>(&json).ok());
-    let notes = host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written));
-    let notes = notes.collect();
+    notes.extend(host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)));
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
-    let reproduce = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
+    let reproduce = reproduce(folder, &mission, &recording);
     let account = Account { notes, reproduce };
     write_run_folder(folder, &recording, &facts, |summary| theory::rows(&mission, Some(summary)), &account)
         .map_err(|error| format!("cannot write the report: {error}"))
+}
+
+/// What makes a run again: the mission as flown, and the speeds that were commanded under way, which are not in it.
+fn reproduce(folder: &Path, mission: &Mission, recording: &Recording) -> Vec<String> {
+    let mut lines = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
+    let planned = mission.speed.steps();
+    let commanded = recording.exact.iter().filter_map(|row| match row {
+        Record::Speed(row) if !planned.iter().any(|step| (step.at.nanos(), step.speed) == (row.t_ns, row.speed)) => {
+            Some((row.t_ns as f64 / 1e9, row.speed))
+        }
+        _ => None,
+    });
+    let mut commanded: Vec<(f64, f64)> = commanded.collect();
+    commanded.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((first, _)) = commanded.first().copied() else { return lines };
+    // A command replaces what the profile says from then on.
+    let before = planned.iter().map(|step| (step.at.secs().max(0.0), step.speed)).filter(|(at, _)| *at < first);
+    let steps: Vec<String> =
+        before.chain(commanded).map(|(at, speed)| format!("{{ from_s = {at:?}, speed = {speed:?} }}")).collect();
+    lines.push(
+        "# The formation speed was changed under way. To have the same, put in place of [formation]:".to_string(),
+    );
+    lines.push("[formation]".to_string());
+    lines.push(format!("profile = [{}]", steps.join(", ")));
+    lines
+}
+
+/// The logs of a fleet of its own below a run folder, of the mission that the folder holds.
+pub fn logs(folder: &Path, digest: u64) -> Vec<PathBuf> {
+    recordings_in(&folder.join("logs").join(format!("{digest:016x}")))
+}
+
+/// The recordings in a folder, in the order of their names.
+pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    files.sort();
+    files
+}
+
+/// Merges what the processes of a run recorded, if nobody did: mission-control was killed before. Gives notes for the report;
+/// `None` if there is a recording, or nothing to make it of.
+///
+/// # Errors
+/// Which file is to blame, and why.
+pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
+    if folder.join(RECORDING).exists() || !folder.join(MISSION).exists() {
+        return Ok(None);
+    }
+    let mission = load(&folder.join(MISSION))?;
+    let logs = logs(folder, mission.digest);
+    if logs.is_empty() {
+        return Ok(None);
+    }
+    let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| error.to_string())?;
+    let mut notes = vec![format!("Merged from {} logs after the run: mission-control did not end it.", logs.len())];
+    notes.extend(shortcomings(&merged).into_iter().map(|text| format!("Missing: {text}")));
+    Ok(Some(notes))
+}
+
+/// What is missing from a merged recording, in words.
+pub fn shortcomings(merged: &Merged) -> Vec<String> {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let cut = merged.incomplete.iter().map(|path| format!("{} ends in the middle", name(path)));
+    let damaged = merged.damaged.iter().map(|(path, chunks, cause)| {
+        format!("{chunks} damaged pieces of {} are left out; the first: {cause}", name(path))
+    });
+    cut.chain(damaged).collect()
+}
+
+/// Whether a run's folder is still to be made. One that was there is somebody's, and not removed again.
+pub fn is_new(wanted: Option<&Path>) -> bool {
+    wanted.is_none_or(|folder| !folder.exists())
+}
+
+/// Removes a new folder of a run that never began, if nothing was recorded in it: the mission's copy and empty folders go,
+/// and what a process said stays.
+pub fn discard(folder: &Path) {
+    let mission = folder.join(MISSION);
+    let logs = folder.join("logs");
+    let said = |path: &Path| fs::metadata(path).is_ok_and(|file| file.is_dir() || file.len() > 0);
+    let silent = fs::read_dir(&logs).is_ok_and(|entries| entries.flatten().all(|entry| !said(&entry.path())));
+    if silent {
+        for entry in fs::read_dir(&logs).into_iter().flatten().flatten() {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+    let _ = fs::remove_dir(&logs);
+    let others = fs::read_dir(folder).map_or(1, |entries| entries.flatten().filter(|e| e.path() != mission).count());
+    if others == 0 {
+        let _ = fs::remove_file(&mission);
+        let _ = fs::remove_dir(folder);
+    }
 }
 
 /// Reads the recording of a run folder, or a recording by itself.
@@ -150,7 +270,13 @@ pub fn report(folder: &Path) -> Result<Summary, String> {
 pub fn recording(run: &Path) -> Result<Recording, String> {
     let path = if run.is_dir() { run.join(RECORDING) } else { run.to_path_buf() };
     if !path.exists() {
-        return Err(format!("no recording at {}; give a run folder or an .mcap file", path.display()));
+        let logs = run.join("logs").is_dir();
+        let how = if logs {
+            format!("; `mission-control report {}` makes it of the logs", run.display())
+        } else {
+            String::new()
+        };
+        return Err(format!("no recording at {}; give a run folder or an .mcap file{how}", path.display()));
     }
     let recording = read(&path).map_err(|error| error.to_string())?;
     if recording.mission_toml.is_empty() {
@@ -183,7 +309,44 @@ fn utc_stamp(now: SystemTime) -> String {
 mod tests {
     use std::time::Duration;
 
+    use common::record::SpeedRow;
+
     use super::*;
+
+    #[test]
+    fn a_speed_commanded_under_way_is_part_of_what_makes_a_run_again() {
+        let text = include_str!("../../missions/auv-helix.toml");
+        let mission = Mission::parse("m", text).expect("sound");
+        let row = |t_s: i64, speed| Record::Speed(SpeedRow { t_ns: t_s * 1_000_000_000, speed });
+        let recording = |rows| Recording { exact: rows, ..Recording::default() };
+        let folder = Path::new("run");
+        let told = reproduce(folder, &mission, &recording(vec![row(0, 0.5)]));
+        assert_eq!(told, ["mission-control simulate run/mission.toml"]);
+        let told = reproduce(folder, &mission, &recording(vec![row(0, 0.5), row(20, 0.4), row(60, 0.3)]));
+        let profile =
+            "profile = [{ from_s = 0.0, speed = 0.5 }, { from_s = 20.0, speed = 0.4 }, { from_s = 60.0, speed = 0.3 }]";
+        assert_eq!(told.last().map(String::as_str), Some(profile));
+        let with = text.replace("speed = 0.5", profile);
+        assert!(Mission::parse("m", &with).is_ok(), "what is told is a section of a mission");
+    }
+
+    #[test]
+    fn a_folder_in_which_nothing_happened_is_removed_and_what_was_said_is_kept() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let folder = ground.path().join("run");
+        let mission = Mission::parse("m", include_str!("../../missions/auv-helix.toml")).expect("sound");
+        let prepare = |said: &str| {
+            make(Some(&folder), &mission).expect("makes");
+            fs::create_dir_all(folder.join("logs")).expect("makes");
+            fs::write(folder.join("logs/network-emulator.log"), said).expect("writes");
+        };
+        prepare("");
+        discard(&folder);
+        assert!(!folder.exists());
+        prepare("no such device");
+        discard(&folder);
+        assert!(folder.join("logs/network-emulator.log").exists() && folder.join(MISSION).exists());
+    }
 
     #[test]
     fn the_stamp_is_the_civil_date() {

@@ -20,15 +20,20 @@ use crate::simulate::{Outcome, simulate};
 /// # Errors
 /// What could not be flown or written.
 pub fn rehearse(mission: &Arc<Mission>, out: Option<&Path>) -> Result<(PathBuf, Outcome, Summary), String> {
+    let is_new = folder::is_new(out);
     let folder = folder::make(out, mission)?;
     let begun = Instant::now();
     let mut progress = Progress::new(mission.end);
     let path = folder.join(RECORDING);
     let outcome = record(mission, &path, |now| progress.reached("simulating", now, ""));
     progress.done();
-    let outcome = outcome?;
-    let host =
-        HostFacts::now("mission-control simulate", begun.elapsed().as_secs_f64(), Vec::new(), outcome.aborted.clone());
+    let outcome = outcome.inspect_err(|_| {
+        if is_new {
+            folder::discard(&folder);
+        }
+    })?;
+    let wall_s = begun.elapsed().as_secs_f64();
+    let host = HostFacts::now("mission-control simulate", None, wall_s, Vec::new(), outcome.aborted.clone());
     let summary = folder::finish(&folder, &host)?;
     Ok((folder, outcome, summary))
 }

@@ -80,6 +80,12 @@ pub enum Failure {
 /// # Errors
 /// Why there is no flight to report on.
 pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
+    let is_new = folder::is_new(plan.out.as_deref());
+    let discard = |folder: &Path| {
+        if is_new {
+            folder::discard(folder)
+        }
+    };
     let make_folder = || folder::make(plan.out.as_deref(), &plan.mission).map_err(Failure::Files);
     let begun = Instant::now();
     let own = plan.attach.is_none();
@@ -91,7 +97,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         Some(endpoint) => (endpoint.clone(), Processes::default(), None),
         None => {
             let folder = make_folder()?;
-            let (endpoint, processes) = Processes::start(&plan.mission, &folder, plan.listen.clone())?;
+            let started = Processes::start(&plan.mission, &folder, plan.listen.clone());
+            let (endpoint, processes) = started.inspect_err(|_| discard(&folder))?;
             (endpoint, processes, Some(folder))
         }
     };
@@ -118,6 +125,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         collected: folder.join(".collected"),
         stop,
         interrupted: false,
+        pace: plan.pace,
+        joined: false,
         garbage: GarbageCount::default(),
     };
     let program = Shared::new(Program::new(conduct, port, Clock::from_now()));
@@ -138,6 +147,7 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         Err(failure) => {
             processes.terminate();
             processes.end();
+            discard(&folder);
             return Err(failure);
         }
     };
@@ -147,20 +157,13 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     let mut missing: Vec<String> = missing.into_iter().map(|(who, why)| format!("log of {who}: {why}")).collect();
     missing.extend(processes.end());
 
-    let logs = if own {
-        files_below(&folder.join("logs").join(format!("{:016x}", plan.mission.digest)))
-    } else {
-        files_below(&collected)
-    };
+    let logs = if own { folder::logs(&folder, plan.mission.digest) } else { folder::recordings_in(&collected) };
     if logs.is_empty() {
         let reason = format!("nothing was recorded: {}; see logs/ in {}", missing.join(", "), folder.display());
         return Err(Failure::Unreachable(reason));
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
-    missing.extend(merged.incomplete.iter().map(|path| format!("{} ends in the middle", file_name(path))));
-    missing.extend(merged.damaged.iter().map(|(path, chunks, cause)| {
-        format!("{chunks} damaged pieces of {} are left out; the first: {cause}", file_name(path))
-    }));
+    missing.extend(folder::shortcomings(&merged));
     // A flight that was joined or only collected may have been started by someone else.
     let pace = pace.unwrap_or(plan.pace);
     missing.extend(late_beginnings(&plan.mission, pace, &merged));
@@ -174,7 +177,11 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         let _ = fs::remove_dir_all(&collected);
     }
     let how = format!("mission-control run{}{}", if own { "" } else { " --attach" }, option(pace));
-    let host = HostFacts::now(&how, begun.elapsed().as_secs_f64(), missing, aborted);
+    let speed_up = match pace {
+        Pace::Real { speed_up } => Some(speed_up),
+        Pace::Stepped => None,
+    };
+    let host = HostFacts::now(&how, speed_up, begun.elapsed().as_secs_f64(), missing, aborted);
     let summary = folder::finish(&folder, &host).map_err(Failure::Files)?;
     Ok(Flown { folder, phase, sound, summary })
 }
@@ -228,18 +235,6 @@ fn late_beginnings(mission: &Mission, pace: Pace, merged: &Merged) -> Vec<String
         )
     })
     .collect()
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// The recordings in a folder, in the order of their names.
-fn files_below(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
-    files.sort();
-    files
 }
 
 /// Who is not armed yet, and why, in words.
@@ -388,6 +383,9 @@ struct ConductPort<'p> {
     collected: PathBuf,
     stop: StopFlag,
     interrupted: bool,
+    pace: Pace,
+    /// Whether it was told that the flight was under way already.
+    joined: bool,
     garbage: GarbageCount,
 }
 
@@ -411,6 +409,9 @@ impl ConductPort<'_> {
             Step::Arming => not_armed(&self.mission, status),
             _ => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{}", self.away(status)),
         };
+        if step == Step::Contact && status.phase == Phase::Running && status.mission == self.mission.text {
+            self.join();
+        }
         // The time of a mission that the fleet flew before is none of this one's.
         let now = if status.mission == self.mission.text { status.now } else { Time::ZERO };
         self.progress.reached(name, now, &message);
@@ -425,6 +426,20 @@ impl ConductPort<'_> {
         let awaited =
             if awaited.is_empty() { awaited.concat() } else { format!("; waiting for {}", awaited.join(", ")) };
         lost + &awaited
+    }
+
+    /// A flight under way has its clock already, and whoever attaches cannot give it another.
+    fn join(&mut self) {
+        let wanted = match self.pace {
+            Pace::Stepped => "--stepped".to_string(),
+            Pace::Real { speed_up } => format!("--speed-up {speed_up}"),
+        };
+        let text = format!(
+            "the flight was under way already: it goes on at the speed it was started with, and {wanted} changes nothing"
+        );
+        if !std::mem::replace(&mut self.joined, true) {
+            self.progress.line(&text);
+        }
     }
 
     fn keep(&self, who: &str, piece: &LogPiece) -> Result<(), String> {

@@ -54,6 +54,16 @@ impl fmt::Display for Faults {
 
 impl std::error::Error for Faults {}
 
+/// A number as a person writes it: not with three hundred digits.
+pub(super) fn plain(value: f64) -> String {
+    let magnitude = value.abs();
+    if magnitude == 0.0 || (1e-6..1e15).contains(&magnitude) || !value.is_finite() {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// Finds the line of a key in a mission file.
 pub(super) struct Locator<'t> {
     text: &'t str,
@@ -100,11 +110,13 @@ impl<'t> Locator<'t> {
 pub struct Collector<'t> {
     locator: Locator<'t>,
     list: Vec<Fault>,
+    /// Whether a link names nobody: what follows from who hears whom is then not told.
+    pub(super) links_in_doubt: bool,
 }
 
 impl<'t> Collector<'t> {
     pub(super) fn new(text: &'t str) -> Collector<'t> {
-        Collector { locator: Locator::new(text), list: Vec::new() }
+        Collector { locator: Locator::new(text), list: Vec::new(), links_in_doubt: false }
     }
 
     /// Notes a fault of a key such as `vehicles[1].start.x_m`.
@@ -117,17 +129,57 @@ impl<'t> Collector<'t> {
         }
     }
 
+    /// Notes a fault that the links have, unless some of them are not known.
+    pub(super) fn fault_of_links(&mut self, key: &str, found: impl fmt::Display, allowed: impl fmt::Display) {
+        if !self.links_in_doubt {
+            self.fault(key, found, allowed);
+        }
+    }
+
+    /// Notes the faults that are in all of these lists, of such keys.
+    pub(super) fn add_common(&mut self, lists: Vec<Vec<Fault>>, of: impl Fn(&str) -> bool) {
+        let Some((first, others)) = lists.split_first() else { return };
+        let common = first.iter().filter(|fault| others.iter().all(|list| list.contains(fault)));
+        for fault in common.filter(|fault| of(&fault.key)) {
+            if !self.list.contains(fault) {
+                self.list.push(fault.clone());
+            }
+        }
+    }
+
+    pub(super) fn into_list(self) -> Vec<Fault> {
+        self.list
+    }
+
     /// Notes a fault at a byte of the file, as the parser reports it.
-    pub(super) fn fault_at(&mut self, byte: Option<usize>, key: String, found: String) {
+    pub(super) fn fault_at(&mut self, byte: Option<usize>, found: String, allowed: String) {
         let line = byte.map_or(0, |byte| self.locator.line_of_byte(byte));
-        self.list.push(Fault { line, key, found, allowed: String::new() });
+        self.list.push(Fault { line, key: String::new(), found, allowed });
+    }
+
+    pub(super) fn line_of_byte(&self, byte: usize) -> usize {
+        self.locator.line_of_byte(byte)
     }
 
     /// Notes a fault unless the number is finite and `ok`.
     pub fn number(&mut self, key: &str, value: f64, ok: bool, allowed: &str) {
         if !(ok && value.is_finite()) {
-            self.fault(key, value, allowed);
+            self.fault(key, plain(value), allowed);
         }
+    }
+
+    /// Notes a fault unless the number is at most so large, whatever its sign.
+    pub(super) fn magnitude(&mut self, key: &str, value: f64, most: f64, unit: &str) {
+        self.number(key, value, value.abs() <= most, &format!("-{most} to {most} {unit}"));
+    }
+
+    /// Notes a fault unless the number is in a range.
+    pub(super) fn between(&mut self, key: &str, value: f64, least: f64, most: f64, unit: &str) {
+        self.number(key, value, (least..=most).contains(&value), &format!("{least} to {most} {unit}"));
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.list.len()
     }
 
     /// Notes a fault unless the number is finite and above 0.

@@ -1,10 +1,12 @@
 //! The mission: the file as written ([`mod@file`]), and the checked form that the machines fly.
 
+mod advice;
 mod build;
 mod check;
 mod fault;
 pub mod file;
 mod link;
+mod mend;
 mod pattern;
 mod read;
 mod shape;

@@ -1,7 +1,8 @@
 //! Compares a file with the schema of what it is read into, so that every unknown or missing key and every value of a
 //! wrong type is found at once, each with its line and what is allowed there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use schemars::JsonSchema;
@@ -29,94 +30,203 @@ fn schema_of<T: JsonSchema>() -> Arc<Value> {
 }
 
 /// Notes every difference in shape between a file and the schema of `T`.
-pub(super) fn check_shape<T: JsonSchema>(faults: &mut Collector<'_>, root: &DeTable<'_>) {
-    table(faults, root, &schema_of::<T>(), "");
+pub(super) fn check_shape<T: JsonSchema>(faults: &mut Collector<'_>, root: &DeTable<'_>) -> Misfits {
+    let mut look = Look { faults, misfits: Misfits { schema: schema_of::<T>(), ..Misfits::default() } };
+    let schema = Arc::clone(&look.misfits.schema);
+    look.table(root, &schema, "");
+    look.misfits
 }
 
-fn table(faults: &mut Collector<'_>, found: &DeTable<'_>, schema: &Value, key: &str) {
-    let Some(properties) = schema["properties"].as_object() else { return };
-    for (name, value) in found.iter() {
-        let key = join(key, name.get_ref());
-        match properties.get(name.get_ref().as_ref()) {
-            Some(schema) => check(faults, value.get_ref(), schema, &key),
-            None => faults.fault(&key, "an unknown key", listed(properties.keys())),
-        }
-    }
-    for required in schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str) {
-        if !found.contains_key(required) {
-            faults.fault(key, format!("no {required}"), describe(&properties[required]));
-        }
-    }
+/// What of a file does not fit its schema.
+#[derive(Debug, Default)]
+pub(super) struct Misfits {
+    pub(super) schema: Arc<Value>,
+    /// Keys whose values cannot be read.
+    pub(super) unreadable: HashSet<String>,
+    /// Keys that are missing.
+    missing: Vec<String>,
 }
 
-fn check(faults: &mut Collector<'_>, found: &DeValue<'_>, schema: &Value, key: &str) {
-    if let Some(choices) = schema["oneOf"].as_array() {
-        return choice(faults, found, choices, key);
+impl Misfits {
+    /// Whether all can be read; unknown keys are faults, but in nobody's way.
+    pub(super) fn none(&self) -> bool {
+        self.unreadable.is_empty() && self.missing.is_empty()
     }
-    if let Some(options) = schema["anyOf"].as_array() {
-        // An optional value: the alternative to it is its absence, which does not come here.
-        if let Some(schema) = options.iter().find(|option| option["type"] != "null") {
-            check(faults, found, schema, key);
-        }
-        return;
-    }
-    let fits = match type_of(schema) {
-        Some("number") => found.is_float() || found.is_integer(),
-        Some("integer") => found.is_integer(),
-        Some("string") => found.is_str(),
-        Some("boolean") => found.is_bool(),
-        Some("array") => found.is_array(),
-        Some("object") => found.is_table(),
-        _ => true,
-    };
-    if !fits {
-        return faults.fault(key, format!("a {}", found.type_str()), describe(schema));
-    }
-    if let (Some(text), Some(values)) = (found.as_str(), schema["enum"].as_array())
-        && !values.iter().any(|value| value == text)
-    {
-        return faults.fault(key, format!("{text:?}"), listed(values.iter().filter_map(Value::as_str)));
-    }
-    if let Some(inner) = found.as_table() {
-        table(faults, inner, schema, key);
-    }
-    if let Some(array) = found.as_array() {
-        let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
-        let count = array.len() as u64;
-        if least.is_some_and(|least| count < least) || most.is_some_and(|most| count > most) {
-            faults.fault(key, format!("{count} values"), format!("{} values", least.or(most).unwrap_or(0)));
-        }
-        for (i, item) in array.iter().enumerate() {
-            check(faults, item.get_ref(), &schema["items"], &format!("{key}[{i}]"));
-        }
+
+    /// Whether a key is one of those whose value has to be made up, or below one.
+    pub(super) fn made_up(&self, key: &str) -> bool {
+        let below = |of: &String| {
+            key.strip_prefix(of.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        self.unreadable.iter().chain(&self.missing).any(below)
     }
 }
 
-/// One of several named things: a name alone, or `{ name = { ... } }`.
-fn choice(faults: &mut Collector<'_>, found: &DeValue<'_>, choices: &[Value], key: &str) {
-    let names = || choices.iter().flat_map(names_of);
-    let tables = |name: &str| choices.iter().find_map(|c| c["properties"].get(name));
-    match (found.as_str(), found.as_table()) {
-        (Some(text), _) if choices.iter().any(|c| c["const"] == text || in_enum(c, text)) => {}
-        (Some(text), _) if tables(text).is_some() => {
-            faults.fault(key, format!("{text:?} alone"), format!("{{ {text} = {{ ... }} }}"));
-        }
-        (Some(text), _) => faults.fault(key, format!("{text:?}"), listed(names())),
-        (_, Some(inner)) if inner.len() == 1 => {
-            for (name, value) in inner.iter() {
-                let name = name.get_ref().as_ref();
-                let key = join(key, name);
-                match tables(name) {
-                    Some(schema) => check(faults, value.get_ref(), schema, &key),
-                    None => faults.fault(&key, format!("{name:?}"), listed(names())),
-                }
+struct Look<'a, 't> {
+    faults: &'a mut Collector<'t>,
+    misfits: Misfits,
+}
+
+impl Look<'_, '_> {
+    fn table(&mut self, found: &DeTable<'_>, schema: &Value, key: &str) {
+        let Some(properties) = schema["properties"].as_object() else { return };
+        for (name, value) in found.iter() {
+            let key = join(key, name.get_ref());
+            match properties.get(name.get_ref().as_ref()) {
+                Some(schema) => self.check(value.get_ref(), schema, &key),
+                None => self.faults.fault(&key, "an unknown key", listed(properties.keys())),
             }
         }
-        _ => faults.fault(key, format!("a {}", found.type_str()), format!("one of {}", listed(names()))),
+        for required in required(schema).filter(|name| !found.contains_key(*name)) {
+            self.misfits.missing.push(join(key, required));
+            self.faults.fault(key, format!("no {required}"), describe(&properties[required]));
+        }
+    }
+
+    /// Notes a value that cannot be read.
+    fn unreadable(&mut self, key: &str, found: impl Display, allowed: impl Display) {
+        self.misfits.unreadable.insert(key.to_string());
+        self.faults.fault(key, found, allowed);
+    }
+
+    fn check(&mut self, found: &DeValue<'_>, schema: &Value, key: &str) {
+        let schema = present(schema);
+        if let Some(choices) = schema["oneOf"].as_array() {
+            return self.choice(found, choices, key);
+        }
+        let fits = match type_of(schema) {
+            Some("number") => found.is_float() || found.is_integer(),
+            Some("integer") => found.is_integer(),
+            Some("string") => found.is_str(),
+            Some("boolean") => found.is_bool(),
+            Some("array") => found.is_array(),
+            Some("object") => found.is_table(),
+            _ => true,
+        };
+        if !fits {
+            return self.unreadable(key, a(found.type_str()), describe(schema));
+        }
+        if !in_range(found, schema) {
+            return self.unreadable(key, shortened(found), describe(schema));
+        }
+        if let (Some(text), Some(values)) = (found.as_str(), schema["enum"].as_array())
+            && !values.iter().any(|value| value == text)
+        {
+            return self.unreadable(key, format!("{text:?}"), listed(values.iter().filter_map(Value::as_str)));
+        }
+        if let Some(inner) = found.as_table() {
+            self.table(inner, schema, key);
+        }
+        if let Some(array) = found.as_array() {
+            let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
+            let count = array.len() as u64;
+            if least.is_some_and(|least| count < least) || most.is_some_and(|most| count > most) {
+                let values = |count: u64| format!("{count} value{}", if count == 1 { "" } else { "s" });
+                self.unreadable(key, values(count), values(least.or(most).unwrap_or(0)));
+            }
+            for (i, item) in array.iter().enumerate() {
+                self.check(item.get_ref(), &schema["items"], &format!("{key}[{i}]"));
+            }
+        }
+    }
+
+    /// One of several named things: a name alone, or `{ name = { ... } }`.
+    fn choice(&mut self, found: &DeValue<'_>, choices: &[Value], key: &str) {
+        let names = || listed(choices.iter().flat_map(names_of));
+        match (found.as_str(), found.as_table()) {
+            (Some(text), _) if choices.iter().any(|c| c["const"] == text || in_enum(c, text)) => {}
+            (Some(text), _) if variant(choices, text).is_some() => {
+                self.unreadable(key, format!("{text:?} alone"), format!("{{ {text} = {{ ... }} }}"));
+            }
+            (Some(text), _) => self.unreadable(key, format!("{text:?}"), names()),
+            (_, Some(inner)) if inner.len() == 1 => {
+                for (name, value) in inner.iter() {
+                    let name = name.get_ref().as_ref();
+                    match variant(choices, name) {
+                        Some(schema) => self.check(value.get_ref(), schema, &join(key, name)),
+                        None => {
+                            self.misfits.unreadable.insert(key.to_string());
+                            self.faults.fault(&join(key, name), format!("{name:?}"), names());
+                        }
+                    }
+                }
+            }
+            (_, Some(inner)) => {
+                let found = inner.iter().map(|(name, _)| name.get_ref().as_ref());
+                let found = if inner.is_empty() { "an empty table".to_string() } else { listed(found) };
+                self.unreadable(key, found, format!("one of {}", names()));
+            }
+            _ => self.unreadable(key, a(found.type_str()), format!("one of {}", names())),
+        }
     }
 }
 
-fn names_of(choice: &Value) -> Vec<&str> {
+/// The schema of a value that is there: an optional one has its absence as an alternative, which never comes here.
+pub(super) fn present(schema: &Value) -> &Value {
+    let options = schema["anyOf"].as_array().into_iter().flatten();
+    options.into_iter().find(|option| option["type"] != "null").map_or(schema, present)
+}
+
+/// The schema of the table that belongs to a name among choices.
+pub(super) fn variant<'s>(choices: &'s [Value], name: &str) -> Option<&'s Value> {
+    choices.iter().find_map(|choice| choice["properties"].get(name))
+}
+
+pub(super) fn required(schema: &Value) -> impl Iterator<Item = &str> {
+    schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str)
+}
+
+/// Whether a number is one that can be kept, and an integer in the range of its type.
+fn in_range(found: &DeValue<'_>, schema: &Value) -> bool {
+    match (found, type_of(schema)) {
+        (DeValue::Integer(_), Some("integer")) => {
+            let (least, most) = range(schema);
+            integer(found).is_some_and(|value| (least..=most).contains(&value))
+        }
+        (DeValue::Integer(_), _) => integer(found).is_some_and(|value| i64::try_from(value).is_ok()),
+        (DeValue::Float(float), _) => {
+            let named = float.as_str().contains("inf") || float.as_str().contains("nan");
+            named || float.as_str().parse::<f64>().is_ok_and(f64::is_finite)
+        }
+        _ => true,
+    }
+}
+
+/// An integer of a file.
+pub(super) fn integer(found: &DeValue<'_>) -> Option<i128> {
+    let DeValue::Integer(number) = found else { return None };
+    i128::from_str_radix(number.as_str(), number.radix()).ok()
+}
+
+/// The integers of a type. A file knows none beyond 64 bits with a sign.
+fn range(schema: &Value) -> (i128, i128) {
+    let most = match schema["format"].as_str() {
+        Some("uint8") => i128::from(u8::MAX),
+        Some("uint16") => i128::from(u16::MAX),
+        Some("uint32") => i128::from(u32::MAX),
+        _ => i128::from(i64::MAX),
+    };
+    let least = if schema["minimum"] == 0 { 0 } else { i128::from(i64::MIN) };
+    (least, schema["maximum"].as_i64().map_or(most, i128::from))
+}
+
+/// A number as written, if it is short.
+fn shortened(found: &DeValue<'_>) -> String {
+    match found {
+        DeValue::Integer(number) if number.as_str().len() <= 24 => number.to_string(),
+        DeValue::Integer(number) => format!("a number of {} digits", number.as_str().len()),
+        DeValue::Float(number) if number.as_str().len() <= 24 => number.to_string(),
+        _ => "a number too large".to_string(),
+    }
+}
+
+/// A type with its article.
+fn a(name: &str) -> String {
+    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {name}")
+}
+
+pub(super) fn names_of(choice: &Value) -> Vec<&str> {
     let constant = choice["const"].as_str();
     let values = choice["enum"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let tables = choice["properties"].as_object().into_iter().flat_map(|p| p.keys()).map(String::as_str);
@@ -127,7 +237,7 @@ fn in_enum(choice: &Value, text: &str) -> bool {
     choice["enum"].as_array().is_some_and(|values| values.iter().any(|value| value == text))
 }
 
-fn type_of(schema: &Value) -> Option<&str> {
+pub(super) fn type_of(schema: &Value) -> Option<&str> {
     match &schema["type"] {
         Value::String(name) => Some(name),
         Value::Array(names) => names.iter().filter_map(Value::as_str).find(|name| *name != "null"),
@@ -135,11 +245,24 @@ fn type_of(schema: &Value) -> Option<&str> {
     }
 }
 
-/// What a value of this schema is, in words: its documentation, or its type.
+/// What a value of this schema is, in words: its type, and what is written of it.
 fn describe(schema: &Value) -> String {
-    match schema["description"].as_str().and_then(|text| text.lines().next()) {
-        Some(text) => text.trim_end_matches('.').to_string(),
-        None => format!("a {}", type_of(schema).unwrap_or("value")),
+    let inner = present(schema);
+    let kind = match type_of(inner) {
+        _ if inner["oneOf"].is_array() => {
+            format!("one of {}", listed(inner["oneOf"].as_array().into_iter().flatten().flat_map(names_of)))
+        }
+        Some("integer") => {
+            let (least, most) = range(inner);
+            format!("an integer from {least} to {most}")
+        }
+        Some("object") => "a table".to_string(),
+        name => a(name.unwrap_or("value")),
+    };
+    let about = schema["description"].as_str().or(inner["description"].as_str());
+    match about.and_then(|text| text.lines().next()) {
+        Some(text) => format!("{kind}: {}", text.trim_end_matches('.')),
+        None => kind,
     }
 }
 
@@ -149,7 +272,7 @@ fn listed<S: AsRef<str>>(names: impl Iterator<Item = S>) -> String {
     names.join(", ")
 }
 
-fn join(key: &str, name: &str) -> String {
+pub(super) fn join(key: &str, name: &str) -> String {
     if key.is_empty() { name.to_string() } else { format!("{key}.{name}") }
 }
 

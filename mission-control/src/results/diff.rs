@@ -41,6 +41,44 @@ pub enum Outcome {
     },
 }
 
+/// What is to be said of two runs, and whether they are equal to their ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// In words.
+    pub text: String,
+    /// Whether both are whole, and the same.
+    pub equal: bool,
+}
+
+/// Compares two runs that may be cut off: what one of them does not reach is no difference, but no equality either.
+pub fn compare(left: &Recording, right: &Recording, names: [&str; 2]) -> Comparison {
+    let ends = [left, right].map(|recording| (!recording.complete).then(|| reach(recording)));
+    let Some(until) = ends.iter().flatten().min().copied() else {
+        let outcome = diff(left, right);
+        return Comparison { text: outcome.to_string(), equal: matches!(outcome, Outcome::Equal { .. }) };
+    };
+    // The instant at which a recording ends may not be whole.
+    let begun = |recording: &Recording| Recording {
+        exact: recording.exact.iter().filter(|row| row.t_ns() < until).cloned().collect(),
+        ..Recording::default()
+    };
+    let cut = ends
+        .iter()
+        .zip(names)
+        .filter_map(|(end, name)| Some(format!("{name} is cut off at {} s", super::export::seconds((*end)?))));
+    let cut: Vec<String> = cut.collect();
+    let text = match diff(&begun(left), &begun(right)) {
+        Outcome::Equal { rows } => format!("equal as far as both go ({rows} rows); {}", cut.join(", ")),
+        outcome => format!("{outcome}; {}", cut.join(", ")),
+    };
+    Comparison { text, equal: false }
+}
+
+/// The instant of the last row.
+fn reach(recording: &Recording) -> i64 {
+    recording.exact.iter().map(Record::t_ns).max().unwrap_or(0)
+}
+
 /// One of two runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
@@ -249,6 +287,28 @@ mod tests {
         assert!(matches!(diff(&right, &left), Outcome::Missing { from: Side::Left, .. }));
         right.exact.clear();
         assert!(matches!(diff(&left, &right), Outcome::Missing { from: Side::Right, t_ns: 0, .. }));
+    }
+
+    #[test]
+    fn a_run_that_is_cut_off_is_compared_as_far_as_it_goes() {
+        let (left, mut right) = (fleet(true), fleet(true));
+        right.exact.retain(|row| row.t_ns() <= 4_000_000_000);
+        right.complete = false;
+        let comparison = compare(&left, &right, ["A", "B"]);
+        assert!(!comparison.equal);
+        assert!(comparison.text.starts_with("equal as far as both go ("), "{}", comparison.text);
+        assert!(comparison.text.ends_with(" rows); B is cut off at 4.0 s"), "{}", comparison.text);
+
+        // A difference before the cut is one; the run that is cut off is named all the same.
+        let Some(Record::State(row)) = right.exact.iter_mut().find(|row| matches!(row, Record::State(_))) else {
+            panic!("a state")
+        };
+        row.speed_mps = 0.123;
+        let comparison = compare(&right, &left, ["A", "B"]);
+        assert!(comparison.text.starts_with("differ at ") && comparison.text.ends_with("; A is cut off at 4.0 s"));
+
+        let whole = compare(&left, &left, ["A", "B"]);
+        assert!(whole.equal && whole.text == format!("equal ({} rows)", left.exact.len()), "{}", whole.text);
     }
 
     #[test]

@@ -7,6 +7,8 @@
 //! | `errors.svg` (in space) | (a) path-following errors (b) coordination errors, outages shaded | Figure 4.3 |
 //! | `rate.svg` | the norm of the coordination error, logarithmic, with the fitted and the guaranteed rate | |
 
+use std::ops::Range;
+
 use bus::recording::Recording;
 use common::record::StateRow;
 use kuva::plot::annotations::ShadedRegion;
@@ -17,7 +19,7 @@ use super::drawing::{
     Drawing, OUTAGE, OUTAGE_LIMIT, PAPER, PLANNED, Panel, SAMPLES, colour, extremes, render, subscript,
 };
 use super::network::Network;
-use super::series::{Coordination, Track, tracks};
+use super::series::{Coordination, Track, tracks, unbroken};
 use super::statistics::fit_exponential;
 use super::summary::thinned;
 
@@ -98,7 +100,10 @@ impl View<'_> {
         let end = points[points.len() - 1].0;
         let lowest = points.iter().fold(f64::INFINITY, |low, point| low.min(point.1));
         let mut panel = Panel::default();
-        panel.series(extremes(points, SAMPLES), 0, "measured");
+        let parts = unbroken(t_s, self.facts)
+            .into_iter()
+            .map(|part| part.map(|at| (t_s[at], norm[at])).filter(|point| point.1 > 0.0).collect());
+        broken(&mut panel, parts.collect(), 0, "measured");
         let fit = fit_exponential(t_s, &norm, self.facts.link_period_s);
         if let Some(fit) = fit {
             let at = t_s.partition_point(|time| *time < fit.from_s).min(norm.len() - 1);
@@ -160,10 +165,13 @@ impl View<'_> {
             panel.line(points, |line| line.with_color(PLANNED).with_stroke_width(1.0).with_dashed());
         }
         for (index, track) in self.tracks.iter().enumerate() {
-            let kept = thinned(track.rows.len(), SAMPLES);
-            let points: Vec<(f64, f64)> = kept.iter().map(|at| (track.rows[*at].x_m, track.rows[*at].y_m)).collect();
-            let Some((start, end)) = points.first().copied().zip(points.last().copied()) else { continue };
-            panel.series(points, index, track.id);
+            let place = |at: usize| (track.rows[at].x_m, track.rows[at].y_m);
+            let total = track.rows.len();
+            let Some((start, end)) = total.checked_sub(1).map(|last| (place(0), place(last))) else { continue };
+            for (number, part) in self.parts(track).into_iter().enumerate() {
+                let kept = thinned(part.len(), share(SAMPLES, part.len(), total));
+                piece(&mut panel, kept.into_iter().map(|at| place(part.start + at)).collect(), index, track.id, number);
+            }
             panel.dot(start, colour(index), 4.5);
             panel.dot(start, PAPER, 2.5);
             panel.dot(end, colour(index), 4.5);
@@ -175,24 +183,27 @@ impl View<'_> {
     fn over_time(&self, title: &str, label: &str, value: impl Fn(&StateRow) -> f64) -> Drawing {
         let mut panel = Panel::default();
         for (index, track) in self.tracks.iter().enumerate() {
-            let points = extremes(track.rows.iter().map(|row| (row.t_ns as f64 / 1e9, value(row))).collect(), SAMPLES);
-            panel.series(points, index, track.id);
+            let point = |at: usize| (track.rows[at].t_ns as f64 / 1e9, value(track.rows[at]));
+            let parts = self.parts(track).into_iter().map(|part| part.map(point).collect());
+            broken(&mut panel, parts.collect(), index, track.id);
         }
         let layout = self.time_axis(panel.layout(title, "time [s]", label));
         panel.laid_out(layout)
     }
 
     fn coordination_errors(&self, title: &str) -> Drawing {
-        let (symbol, t_s) = (self.facts.symbol(), &self.coordination.t_s);
+        let symbol = self.facts.symbol();
         let mut panel = Panel::default();
-        let (first, others) = match self.coordination.states.split_first() {
-            Some((first, others)) => (first.as_slice(), others),
-            None => (&[][..], &[][..]),
-        };
-        for (index, other) in others.iter().enumerate() {
-            let points =
-                extremes(t_s.iter().zip(first.iter().zip(other)).map(|(t, (a, b))| (*t, a - b)).collect(), SAMPLES);
-            panel.series(points, index + 1, &format!("{symbol}₁ − {symbol}{}", subscript(index + 2)));
+        let mut present = self.tracks.iter().filter(|track| !track.rows.is_empty());
+        let first = present.next();
+        for (index, other) in present.enumerate() {
+            // Each pair by itself: that a third one is away is nothing to it.
+            let Some(first) = first else { break };
+            let Coordination { t_s, states } = Coordination::of(&[first.clone(), other.clone()], self.facts);
+            let parts = unbroken(&t_s, self.facts)
+                .into_iter()
+                .map(|part| part.map(|at| (t_s[at], states[0][at] - states[1][at])).collect());
+            broken(&mut panel, parts.collect(), index + 1, &format!("{symbol}₁ − {symbol}{}", subscript(index + 2)));
         }
         if let Some((rate, height)) = self.envelope() {
             for sign in [1.0, -1.0] {
@@ -212,6 +223,12 @@ impl View<'_> {
         panel.laid_out(layout)
     }
 
+    /// The rows of a vehicle, in parts between which it was away.
+    fn parts(&self, track: &Track<'_>) -> Vec<Range<usize>> {
+        let t_s: Vec<f64> = track.rows.iter().map(|row| row.t_ns as f64 / 1e9).collect();
+        unbroken(&t_s, self.facts)
+    }
+
     fn time_axis(&self, layout: Layout) -> Layout {
         if self.facts.duration_s > 0.0 {
             layout.with_x_axis_min(0.0).with_x_axis_max(self.facts.duration_s)
@@ -219,6 +236,29 @@ impl View<'_> {
             layout
         }
     }
+}
+
+/// A line with gaps: what was not recorded is not drawn. What is no number cannot be drawn either.
+fn broken(panel: &mut Panel, parts: Vec<Vec<(f64, f64)>>, index: usize, name: &str) {
+    let total = parts.iter().map(Vec::len).sum();
+    for (number, points) in parts.into_iter().enumerate() {
+        let samples = share(SAMPLES, points.len(), total);
+        let finite = points.into_iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+        piece(panel, extremes(finite, samples), index, name, number);
+    }
+}
+
+/// One part of a line; the first has the line's name.
+fn piece(panel: &mut Panel, points: Vec<(f64, f64)>, index: usize, name: &str, number: usize) {
+    match number {
+        0 => panel.series(points, index, name),
+        _ => panel.line(points, |line| line.with_color(colour(index)).with_stroke_width(1.5)),
+    }
+}
+
+/// The samples that a part of so many rows gets of all.
+fn share(samples: usize, part: usize, total: usize) -> usize {
+    if part == total { samples } else { (samples * part / total.max(1)).max(2) }
 }
 
 #[cfg(test)]
@@ -246,6 +286,21 @@ mod tests {
         for text in ["time [s]", "‖e‖ [m]", "γ₁ − γ₃", "(b) Coordination errors"] {
             assert!(all[1].svg.contains(text), "{text}");
         }
+    }
+
+    #[test]
+    fn what_was_not_recorded_is_not_drawn() {
+        let lines = |recording: &Recording| {
+            let all = figures(recording, &facts(true));
+            let errors = &all.iter().find(|figure| figure.name == "errors").expect("drawn").svg;
+            errors.matches("<path").count() + errors.matches("<polyline").count()
+        };
+        let (whole, mut away) = (fleet(true), fleet(true));
+        // v2 is away in the middle: its own line and that of γ₁ − γ₂ are broken, and no other.
+        let gap = |row: &Record| matches!(row, Record::State(row) if *row.vehicle == *"v2" && (4_000_000_000..20_000_000_000).contains(&row.t_ns));
+        assert!(away.exact.iter().any(gap));
+        away.exact.retain(|row| !gap(row));
+        assert_eq!(lines(&away), lines(&whole) + 2);
     }
 
     #[test]

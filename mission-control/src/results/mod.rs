@@ -8,7 +8,7 @@
 //! | [`report()`] | `report.html`, one self-contained file |
 //! | [`write_run_folder`] | all of these into a run folder, each file whole or not at all |
 //! | [`export_csv`] | `vehicles.csv`, `links.csv`, `topology.csv` |
-//! | [`diff()`] | *equal*, or the first row in which two runs part |
+//! | [`diff()`], [`compare()`] | *equal*, or the first row in which two runs part |
 
 mod chart;
 mod diff;
@@ -28,7 +28,7 @@ pub(crate) mod testing;
 mod trace;
 
 pub use chart::{Chart, Curve};
-pub use diff::{Outcome, Side, diff, origins_differ};
+pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts};
 pub use figures::{Figure, figures};

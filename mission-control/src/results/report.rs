@@ -111,12 +111,20 @@ fn verdict(report: &Report<'_>) -> (bool, String) {
     let mut sentences = Vec::new();
     if flown > 1 {
         let settled = coordination.settled_s.or(coordination.settled_absolute_s);
-        let range = format!(
+        let mut range = format!(
             "the largest coordination error went from {} to {}",
             number(coordination.initial),
             number(coordination.last)
         );
-        good &= settled.is_some();
+        if let Some(at) = coordination.early(report.summary.duration_s) {
+            let _ = write!(range, " at {} s, when all were last recorded", number(at));
+        }
+        // An error that was never measured is none that is small.
+        let settled = settled.filter(|_| coordination.last_s.is_some());
+        if coordination.last_s.is_none() {
+            range = "the vehicles were never recorded together".to_owned();
+        }
+        good &= settled.is_some() && coordination.early(report.summary.duration_s).is_none();
         sentences.push(match settled {
             Some(at) => format!("<strong>Coordinated after {} s</strong>: {range}.", number(at)),
             None => format!("<strong>Not coordinated at the end</strong>: {range}."),
@@ -163,7 +171,8 @@ fn theory(page: &mut String, rows: &[TheoryRow]) {
             Some(false) => "<span class=\"no\">no</span>",
             None => "–",
         };
-        let text = [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(text));
+        let text =
+            [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(&told(text)));
         let [name, condition, value, predicted, measured] = text;
         vec![name, condition, value, holds.into(), predicted, measured]
     });
@@ -203,7 +212,7 @@ fn vehicles(page: &mut String, report: &Report<'_>) {
             escape(&vehicle.path),
             number(vehicle.steady_speed),
             number(vehicle.steady_speed_mps),
-            number(vehicle.path_error_final_m),
+            at_end(vehicle, report.summary.duration_s),
             number(vehicle.path_error_rms_m),
             optional(vehicle.on_path_s, ""),
             number(vehicle.along_mean_m),
@@ -406,6 +415,28 @@ pub(crate) fn escape(text: &str) -> String {
     escaped
 }
 
+/// What is fit to be told to a person: a text with a number in it that is none says nothing, and none has a hundred digits.
+pub(crate) fn told(text: &str) -> String {
+    let is_none = |word: &str| ["NaN", "nan", "inf"].contains(&word);
+    if text.split(|c: char| !c.is_alphanumeric()).any(is_none) {
+        return "–".into();
+    }
+    let short = |word: &str| match word.parse::<f64>() {
+        Ok(value) if word.len() > MOST_DIGITS => format!("{value:.3e}"),
+        _ => word.to_owned(),
+    };
+    text.split(' ').map(short).collect::<Vec<_>>().join(" ")
+}
+
+/// A number with more characters than this is better written with a power of ten.
+const MOST_DIGITS: usize = 24;
+
+/// The path-following error at the end, with the instant if the vehicle did not last.
+fn at_end(vehicle: &VehicleSummary, duration_s: f64) -> String {
+    let error = number(vehicle.path_error_final_m);
+    vehicle.early(duration_s).map_or(error.clone(), |at| format!("{error} (at {} s)", number(at)))
+}
+
 fn optional(value: Option<f64>, unit: &str) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{}{unit}", number(value)))
 }
@@ -416,6 +447,9 @@ fn percent(part: f64) -> String {
 
 /// A number with three or four significant digits, as HTML.
 pub(crate) fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
     let magnitude = value.abs();
     let minus = if value < 0.0 { "−" } else { "" };
     if magnitude == 0.0 {
@@ -491,6 +525,41 @@ mod tests {
     fn a_condition_that_does_not_hold_asks_for_attention() {
         let page = page(false, &[TheoryRow { holds: Some(false), ..TheoryRow::default() }]);
         assert!(page.contains("verdict attention") && page.contains("1 condition of the theory does not hold"));
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_printed() {
+        assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(number), ["–"; 3]);
+        let row = TheoryRow { predicted: "-NaN m".into(), measured: "inf".into(), ..TheoryRow::default() };
+        let page = page(false, &[row]);
+        for text in ["NaN", ">inf<"] {
+            assert!(!page.contains(text), "{text}");
+        }
+        assert_eq!(told("information from infinity"), "information from infinity");
+        assert_eq!(told(&format!("{:.5} 1/s, 0.25 m", -1.5e137)), "-1.500e137 1/s, 0.25 m");
+    }
+
+    #[test]
+    fn a_number_that_is_not_of_the_end_has_its_instant() {
+        let (mut recording, facts) = (fleet(true), facts(true));
+        let last = recording.exact.iter().map(common::record::Record::t_ns).max().expect("rows");
+        let of_v2 = |row: &common::record::Record| matches!(row, common::record::Record::State(row) if *row.vehicle == *"v2" && row.t_ns > last / 4);
+        recording.exact.retain(|row| !of_v2(row));
+        let summary = summarise(&recording, &facts);
+        let at = summary.fleet.coordination.early(facts.duration_s).expect("before the end");
+        let page = report(&Report {
+            facts: &facts,
+            summary: &summary,
+            clock: &summarise_clock(&recording),
+            figures: &[],
+            theory: &[],
+            notes: &[],
+            reproduce: &[],
+            mission_toml: "",
+        });
+        assert!(page.contains(&format!("at {} s, when all were last recorded", number(at))), "{at}");
+        assert!(page.contains("verdict attention"));
+        assert!(page.contains("v2 recorded nothing after "));
     }
 
     #[test]

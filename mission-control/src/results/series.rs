@@ -1,5 +1,7 @@
 //! Time series of a fleet, out of the rows of its recording.
 
+use std::ops::Range;
+
 use common::mission::Pattern;
 use common::record::{Record, SpeedRow, StateRow};
 use common::time::Time;
@@ -116,6 +118,18 @@ impl Coordination {
     }
 }
 
+/// The parts of a series without a gap. A gap is three times as long as what is usual between two instants of the series, and ten
+/// control periods at least: a busy machine may cost a row, a vehicle that is away costs many.
+pub(super) fn unbroken(t_s: &[f64], facts: &Facts) -> Vec<Range<usize>> {
+    let mut steps: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    let usual = if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let longest = (3.0 * usual).max(10.0 * facts.control_period_s) + 1e-9;
+    let breaks = (1..t_s.len()).filter(|at| t_s[*at] - t_s[*at - 1] > longest);
+    let bounds: Vec<usize> = std::iter::once(0).chain(breaks).chain([t_s.len()]).collect();
+    bounds.windows(2).map(|pair| pair[0]..pair[1]).filter(|part| !part.is_empty()).collect()
+}
+
 fn interpolate(rows: &[&StateRow], cursor: &mut usize, t_ns: i64, gap_ns: i64) -> Option<f64> {
     while rows.get(*cursor).is_some_and(|row| row.t_ns < t_ns) {
         *cursor += 1;
@@ -189,6 +203,17 @@ mod tests {
         let rows =
             [(0, "b", 0.0), (0, "a", 0.0), (1000, "a", 0.0), (2000, "a", 0.0), (2000, "b", 0.0), (2100, "a", 0.0)];
         assert_eq!(coordination(&rows).t_s, [0.0, 2.0]);
+    }
+
+    #[test]
+    fn a_series_is_broken_where_a_vehicle_was_away_and_not_where_a_row_is_missing() {
+        let facts = Facts { control_period_s: 0.05, ..Facts::default() };
+        let missing_one = [0.0, 0.5, 1.0, 2.0, 2.5];
+        let whole = unbroken(&missing_one, &facts);
+        assert_eq!((whole.len(), &whole[0]), (1, &(0..5)));
+        let away = [0.0, 0.5, 1.0, 90.0, 90.5, 91.0];
+        assert_eq!(unbroken(&away, &facts), [0..3, 3..6]);
+        assert!(unbroken(&[], &facts).is_empty());
     }
 
     #[test]

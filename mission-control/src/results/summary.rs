@@ -78,8 +78,10 @@ pub struct CoordinationSummary {
     pub initial: f64,
     /// Its largest value.
     pub largest: f64,
-    /// Its value at the end.
+    /// Its value at the end, or when the whole fleet was last recorded.
     pub last: f64,
+    /// That instant \[s\]; `None` if the fleet never was.
+    pub last_s: Option<f64>,
     /// Its root mean square in the steady part.
     pub steady_rms: f64,
     /// From when on it stayed below 2 % of its largest value \[s\].
@@ -94,6 +96,25 @@ pub struct CoordinationSummary {
     pub at_least_guaranteed: Option<bool>,
     /// The error over time.
     pub series: CoordinationSeries,
+}
+
+impl CoordinationSummary {
+    /// The instant of the last value, if that is not the end of the run: a vehicle was away from then on.
+    pub fn early(&self, duration_s: f64) -> Option<f64> {
+        self.last_s.filter(|last_s| is_early(*last_s, duration_s))
+    }
+}
+
+/// Whether an instant is before the end by more than a row or two.
+fn is_early(t_s: f64, duration_s: f64) -> bool {
+    duration_s - t_s > (0.01 * duration_s).max(1.0)
+}
+
+impl VehicleSummary {
+    /// The instant of the last row, if that is not the end of the run.
+    pub fn early(&self, duration_s: f64) -> Option<f64> {
+        self.last_s.filter(|last_s| is_early(*last_s, duration_s))
+    }
 }
 
 /// The coordination error over time, thinned.
@@ -157,6 +178,8 @@ pub struct VehicleSummary {
     pub pattern_offset: f64,
     /// Rows of its state.
     pub rows: u64,
+    /// Instant of the last of them \[s\].
+    pub last_s: Option<f64>,
     /// x_i − x_1 at the end.
     pub coordination_final: f64,
     /// Mean rate of ξ in the steady part \[units of ξ per s\].
@@ -269,7 +292,8 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
     let complete = recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);
     let mut known = facts.aborted.clone();
     known.extend_from_slice(&facts.missing);
-    known.extend(warnings(recording, &vehicles, &links));
+    let end_s = largest(vehicles.iter().filter_map(|vehicle| vehicle.last_s));
+    known.extend(warnings(recording, &vehicles, &links, end_s));
     Summary {
         format: 1,
         mission: facts.mission.clone(),
@@ -339,6 +363,7 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts) -> Coordinat
         initial: spread.first().copied().unwrap_or(0.0),
         largest: peak,
         last: spread.last().copied().unwrap_or(0.0),
+        last_s: t_s.last().copied(),
         steady_rms: rms(spread[steady..].iter().copied()),
         settled_s: settling_time(t_s, &spread, SETTLED_PART * peak),
         settled_absolute_s: settling_time(t_s, &spread, COORDINATION_THRESHOLD),
@@ -368,6 +393,7 @@ fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts, said: &BTreeMap<
         path: planned.map(|vehicle| vehicle.path.clone()).unwrap_or_default(),
         pattern_offset: track.pattern.constant,
         rows: rows.len() as u64,
+        last_s: t_s.last().copied(),
         coordination_final: removed(track).zip(first).map_or(0.0, |(own, first)| own - first),
         steady_speed: match (steady.first(), steady.last()) {
             // The mean rate of ξ − h exactly, not the mean of samples of the rate.
@@ -425,7 +451,7 @@ fn totals(links: &[LinkSummary], said: &BTreeMap<&str, u64>, facts: &Facts) -> M
     }
 }
 
-fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSummary]) -> Vec<String> {
+fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSummary], end_s: f64) -> Vec<String> {
     let mut warnings = Vec::new();
     if !recording.complete {
         let how = recording.damage.as_ref().map_or(String::new(), |damage| format!(" ({damage})"));
@@ -433,6 +459,10 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
     }
     for vehicle in vehicles.iter().filter(|vehicle| vehicle.rows == 0) {
         warnings.push(format!("{} has no rows: it is not part of the fleet's numbers.", vehicle.id));
+    }
+    for (vehicle, at) in vehicles.iter().filter_map(|vehicle| Some((vehicle, vehicle.early(end_s)?))) {
+        warnings
+            .push(format!("{} recorded nothing after {at} s: its numbers at the end are of that instant.", vehicle.id));
     }
     for link in links.iter().filter(|link| !link.balanced) {
         warnings.push(format!(

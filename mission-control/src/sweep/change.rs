@@ -85,7 +85,11 @@ mod tests {
     fn what_no_mission_has_is_refused_with_the_reason() {
         for (key, value, reason) in [
             ("network.los", Value::from(1.0), "network.los: found an unknown key; allowed: "),
-            ("coordination.law.switching.gain", Value::from(1.0), "coordination.law: found a table; allowed: one of"),
+            (
+                "coordination.law.switching.gain",
+                Value::from(1.0),
+                "coordination.law: found introduction, switching; allowed: one of",
+            ),
             ("vehicles[7].id", Value::from("x"), "vehicles[7].id: found nothing at vehicles[7]"),
             ("duration_s.x", Value::from(1), "duration_s.x: found nothing at duration_s"),
             ("duration_s", Value::from("long"), "duration_s: found a string; allowed: "),

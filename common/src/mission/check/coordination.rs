@@ -44,7 +44,14 @@ pub(super) fn check_law(
         return None;
     }
     let in_order: Vec<&str> = file.vehicles.iter().map(|vehicle| vehicle.id.as_str()).collect();
-    match build::law(choice, &in_order) {
+    // A delay out of range has been told under its own key, and must not hide the gain.
+    let mut choice = choice.clone();
+    if let LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) = &mut choice
+        && !(0.0..=3600.0).contains(&law.delay_s)
+    {
+        law.delay_s = 0.0;
+    }
+    match build::law(&choice, &in_order) {
         Ok(law) => Some(law),
         Err(reason) => {
             faults.fault(&format!("{key}.{name}"), reason, "gains above 0");
@@ -91,7 +98,7 @@ pub(super) fn check_weights(
         let named = format!("{} and {}", weight.link[0], weight.link[1]);
         if !links.iter().any(|link| (link.from.min(link.to), link.from.max(link.to)) == pair) {
             let found = format!("a weight between {named}, which have no link");
-            faults.fault(&key, found, "a link of network.links or network.one_way");
+            faults.fault_of_links(&key, found, "a link of network.links or network.one_way");
         }
         if seen.contains(&pair) {
             faults.fault(&key, format!("a second weight between {named}"), "one weight for both directions of a link");
@@ -128,7 +135,7 @@ pub(super) fn check_partners(
                 LawChoice::Neighbours(_) => "links between vehicles that are next to one another in the file",
                 _ => "links between the gateway and every other vehicle",
             };
-            faults.fault("network.links", found, allowed);
+            faults.fault_of_links("network.links", found, allowed);
         }
     }
 }
@@ -146,7 +153,7 @@ pub(super) fn check_told(faults: &mut Collector<'_>, file: &MissionFile, ids: &H
     let name = build::law_name(&file.coordination.law);
     let found = format!("{id}, whose word does not reach every vehicle over the links of the network");
     let allowed = format!("for {name}, a vehicle that every other hears, directly or through others");
-    faults.fault(&format!("coordination.law.{name}.{part}"), found, allowed);
+    faults.fault_of_links(&format!("coordination.law.{name}.{part}"), found, allowed);
 }
 
 #[cfg(test)]

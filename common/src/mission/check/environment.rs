@@ -11,7 +11,7 @@ use crate::time::Time;
 use crate::vehicle::environment::{Current, Disturbances, NoiseLevels, StuckSpeed, Tide};
 
 /// Fastest water, and largest errors of instruments, in m/s, m, deg and deg/s: beyond it a number is a slip of the pen.
-const LARGEST: f64 = 1e4;
+pub(super) const LARGEST: f64 = 1e4;
 
 /// What disturbs a vehicle: its own keys, or the fleet's. Faults are noted at the key where they are written.
 pub(super) fn check_disturbances(faults: &mut Collector<'_>, file: &MissionFile, index: usize) -> Disturbances {

@@ -3,6 +3,7 @@
 mod coordination;
 mod environment;
 mod network;
+mod path;
 mod talk;
 mod time;
 mod vehicle;
@@ -17,7 +18,7 @@ use self::vehicle::check_vehicle;
 use super::build;
 use super::fault::{Collector, Faults};
 use super::file::{MissionFile, VehicleSection};
-use super::read::shaped;
+use super::read::examine;
 use super::{Mission, SpeedProfile, VehiclePlan, digest};
 use crate::time::Span;
 
@@ -30,13 +31,18 @@ pub(super) const LONGEST: f64 = 30.0 * 86_400.0;
 /// Greatest formation speed \[units of ξ per s\].
 pub(super) const FASTEST: f64 = 1e6;
 
+/// Farthest place from the origin \[m\]: a quarter of the way round the globe. Beyond it a number is a slip of the pen, and
+/// squares and differences lose their digits.
+pub(super) const FARTHEST: f64 = 1e7;
+
+/// Greatest path parameter and place in the pattern \[units of ξ\].
+pub(super) const LARGEST_XI: f64 = 1e9;
+
+/// Greatest angle \[deg\].
+pub(super) const LARGEST_ANGLE: f64 = 1e6;
+
 pub(super) fn check(name: &str, text: &str) -> Result<Mission, Faults> {
-    let mut faults = Collector::new(text);
-    let Some(file) = shaped::<MissionFile>(&mut faults, text) else { return Err(faults.into_faults(name)) };
-    match assemble(&mut faults, &file, text) {
-        Some(mission) if faults.is_empty() => Ok(mission),
-        _ => Err(faults.into_faults(name)),
-    }
+    examine(name, text, |faults, file: MissionFile| assemble(faults, &file, text))
 }
 
 /// Everything that is checked beyond the shape; `None` only with a fault noted.
@@ -112,6 +118,7 @@ fn check_ids(faults: &mut Collector<'_>, vehicles: &[VehicleSection]) -> HashMap
         if let Some(first) = ids.insert(vehicle.id.clone(), i) {
             let found = format!("{:?}, which is vehicles[{first}] too", vehicle.id);
             faults.fault(&key, found, "a name that no other vehicle has");
+            faults.links_in_doubt = true;
         }
     }
     ids
@@ -334,6 +341,72 @@ mod tests {
         }
         let lines: Vec<usize> = found.iter().filter_map(|l| l.split(':').nth(1)?.parse().ok()).collect();
         assert!(lines.is_sorted(), "{found:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_read_hides_nothing_else() {
+        let text = HELIX
+            .replace("duration_s = 800.0", "duration_s = -3")
+            .replace("seed = 1", "seed = -1")
+            .replace("speed = 0.5", "speed = \"fast\"")
+            .replace("gain = 0.1, delay_s = 5.0", "gain = 0.1, delay_s = -1.0")
+            .replace("validity_s = 0.3", "validity_s = 0.01")
+            .replace("id = \"auv3\"", "id = \"auv1\"")
+            .replacen("radius_m = 20.0", "radius_m = -20.0", 1)
+            .replacen("lap = 400.0", "laps = 400.0", 1)
+            .replace("x_m = 5.0, y_m = -20.0, z_m = 5.0", "x_m = true, y_m = -20.0, z_m = 1e99");
+        let found = faults(&text);
+        for expected in [
+            "m.toml:6: seed: found -1; allowed: an integer from 0 to 9223372036854775807: Seed of every random stream",
+            "formation.speed: found a string; allowed: a number: Formation speed v_L",
+            "duration_s: found -3; ",
+            "delayed_with_losses.delay_s: found -1; allowed: 0 to 3600 s",
+            "coordination.validity_s: found 0.01; ",
+            "vehicles[2].id: found \"auv1\", which is vehicles[0] too",
+            "vehicles[0].path.helix.radius_m: found -20; ",
+            "vehicles[0].path.helix.laps: found an unknown key; ",
+            "vehicles[0].path.helix: found no lap; allowed: a number: One lap",
+            "vehicles[2].start.x_m: found a boolean; allowed: a number: East (m)",
+            "vehicles[2].start.z_m: found 1e99; ",
+        ] {
+            assert!(found.iter().any(|line| line.contains(expected)), "{expected}: {found:#?}");
+        }
+        // A link to auv3, which is auv1 now; all else would be a consequence of a stand-in.
+        assert_eq!(found.len(), 12, "{found:#?}");
+        assert!(!found.iter().any(|line| line.contains("stand-in")), "{found:#?}");
+    }
+
+    #[test]
+    fn a_fault_that_only_follows_from_another_is_not_told() {
+        for (old, new, key) in [
+            ("[\"auv2\", \"auv3\"]", "[\"auv2\", \"auv9\"]", "network.links[1]: found \"auv9\", which is no vehicle"),
+            ("id = \"auv2\"", "id = 2", "vehicles[1].id: found an integer; "),
+            ("control_period_s = 0.05", "control_period_s = \"x\"", "clock.control_period_s: found a string; "),
+            ("period_s = 10.0", "period_s = []", "network.switching.periodic.period_s: found an array; "),
+            ("law = { delayed_with_losses", "law = { delayed_with_loses", "coordination.law.delayed_with_loses: "),
+            ("{ underactuated_auv = \"sirene\" }", "\"submarine\"", "fleet.model: found \"submarine\"; "),
+            ("start = { x_m = 5.0, y_m = -10.0, z_m = -5.0 }", "", "vehicles[0]: found no start; "),
+            ("[[\"auv1\", \"auv2\"], ", "[[\"auv1\"], ", "network.links[0]: found 1 value; allowed: 2 values"),
+            ("path = { helix = ", "path = { spiral = ", "vehicles[0].path.spiral: found \"spiral\"; allowed: chain, "),
+            ("duration_s = 800.0", "duration_s = 1e999", "duration_s: found 1e999; allowed: a number: "),
+            ("seed = 1", "seed = 99999999999999999999999999", "seed: found a number of 26 digits; "),
+        ] {
+            let found = faults_with(old, new);
+            assert!(found.len() == 1 && found[0].contains(key), "{new}: {found:#?}");
+        }
+    }
+
+    #[test]
+    fn what_is_made_up_is_not_blamed() {
+        let begin = HELIX.find("[[vehicles]]").expect("vehicles");
+        for vehicles in ["", "vehicles = 3\n"] {
+            let text = format!("{vehicles}{}", &HELIX[..begin].replace("gain = 0.1", "gain = 0.0"));
+            let found = faults(&text);
+            let expected = if vehicles.is_empty() { "found no vehicles; " } else { "vehicles: found an integer; " };
+            assert!(found.iter().any(|line| line.contains(expected)), "{found:#?}");
+            assert!(found.iter().any(|line| line.contains("delayed_with_losses: found ")), "{found:#?}");
+            assert_eq!(found.len(), 2, "{found:#?}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Clock, duration and formation speed.
 
 use super::super::SpeedProfile;
-use super::super::fault::Collector;
+use super::super::fault::{Collector, plain};
 use super::super::file::{MissionFile, SpeedStep};
 use super::{FASTEST, LONGEST};
 use crate::time::{Span, Time};
@@ -24,7 +24,13 @@ pub(super) fn check_times(faults: &mut Collector<'_>, file: &MissionFile) -> Opt
     if !(1..=1000).contains(&file.clock.substeps) {
         faults.fault("clock.substeps", file.clock.substeps, "1 to 1000");
     }
-    if !period_ok || !duration_ok {
+    if let Some(validity) = file.coordination.validity_s {
+        let key = "coordination.validity_s";
+        let least = file.coordination.message_period_s;
+        let allowed = format!("at least the message period, {least} s; leave it out for ever");
+        faults.number(key, validity, validity >= least && validity <= LONGEST, &allowed);
+    }
+    if !period_ok {
         return None;
     }
     let control_period = Span::from_secs(period);
@@ -33,22 +39,19 @@ pub(super) fn check_times(faults: &mut Collector<'_>, file: &MissionFile) -> Opt
         let ticks = if span.is_finite() && span > 0.0 && span <= LONGEST { ticks_in(span) } else { 0 };
         let exact = ticks >= 1 && (control_period * ticks).nanos() == Span::from_secs(span).nanos();
         if !exact {
-            faults.fault(key, format!("{span} s"), format!("a multiple of the control period, {period} s"));
+            faults.fault(key, format!("{} s", plain(span)), format!("a multiple of the control period, {period} s"));
         }
         ticks.max(1)
     };
     let record_ticks = multiple("clock.record_period_s", file.clock.record_period_s);
     let message_ticks = multiple("coordination.message_period_s", file.coordination.message_period_s);
+    if !duration_ok {
+        return None;
+    }
     let end = Time::ZERO + control_period * ticks_in(file.duration_s).max(1);
     if ticks_in(file.duration_s) > i64::from(u32::MAX) {
         let allowed = format!("at most {} control periods", u32::MAX);
         faults.fault("duration_s", format!("{} s", file.duration_s), allowed);
-    }
-    if let Some(validity) = file.coordination.validity_s {
-        let key = "coordination.validity_s";
-        let least = file.coordination.message_period_s;
-        let allowed = format!("at least the message period, {least} s; leave it out for ever");
-        faults.number(key, validity, validity >= least && validity <= LONGEST, &allowed);
     }
     Some(Times { end, control_period, record_ticks, message_ticks })
 }

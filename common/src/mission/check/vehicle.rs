@@ -7,7 +7,9 @@ use super::super::file::{
     FollowingChoice, FollowingType, LawChoice, MissionFile, ModelChoice, PathChoice, SegmentChoice, VehicleSection,
 };
 use super::super::{Pattern, PatternMotion, Start, VehiclePlan, build};
-use super::environment::{check_disturbances, check_limits};
+use super::environment::{LARGEST, check_disturbances, check_limits};
+use super::path::check_path;
+use super::{FARTHEST, LARGEST_ANGLE, LARGEST_XI};
 use crate::coordination::{DemandKind, FleetLaw};
 use crate::path::Path;
 use crate::path::closest::closest_parameter;
@@ -23,19 +25,17 @@ pub(super) fn check_vehicle(
     let section = &file.vehicles[index];
     let key = format!("vehicles[{index}]");
     let start = &section.start;
-    for (name, value) in [
-        ("x_m", start.x_m),
-        ("y_m", start.y_m),
-        ("z_m", start.z_m),
-        ("yaw_deg", start.yaw_deg),
-        ("speed_mps", start.speed_mps),
+    for (name, value, most, unit) in [
+        ("x_m", start.x_m, FARTHEST, "m"),
+        ("y_m", start.y_m, FARTHEST, "m"),
+        ("z_m", start.z_m, FARTHEST, "m"),
+        ("yaw_deg", start.yaw_deg, LARGEST_ANGLE, "deg"),
+        ("speed_mps", start.speed_mps, LARGEST, "m/s"),
+        ("xi", start.xi.unwrap_or(0.0), LARGEST_XI, "units of xi"),
     ] {
-        faults.finite(&format!("{key}.start.{name}"), value, "");
+        faults.magnitude(&format!("{key}.start.{name}"), value, most, unit);
     }
     let pattern = check_pattern(faults, file, &key, section);
-    if let Some(xi) = start.xi {
-        faults.finite(&format!("{key}.start.xi"), xi, "units of xi");
-    }
     let model = section.model.clone().or_else(|| file.fleet.model.clone());
     let following = section.following.clone().or_else(|| file.fleet.following.clone());
     if model.is_none() {
@@ -52,17 +52,18 @@ pub(super) fn check_vehicle(
     }
     let disturbances = check_disturbances(faults, file, index);
     let limits = model.as_ref().map(|model| check_limits(faults, file, index, model)).unwrap_or_default();
-    let path = match build::path(&section.path) {
-        Ok(path) => path,
-        Err(reason) => {
-            faults.fault(&format!("{key}.path.{}", path_name(&section.path)), reason, "");
-            return None;
-        }
-    };
+    let path_key = format!("{key}.path.{}", path_name(&section.path));
+    let in_range = check_path(faults, &path_key, &section.path);
+    let path = in_range.then(|| build::path(&section.path)).and_then(|built| {
+        built
+            .map_err(|reason| faults.fault(&path_key, reason, "numbers that make a path, as docs/missions.md says"))
+            .ok()
+    });
     let (model, following) = (model?, following?);
-    if !check_fit(faults, &key, section, file, &model, &following, law, path.as_ref()) {
+    if !check_fit(faults, &key, section, file, &model, &following, law, path.as_deref()) {
         return None;
     }
+    let path = path?;
     let position = Vector3::new(start.x_m, start.y_m, start.z_m);
     let usable = position.iter().all(|x| x.is_finite());
     let xi = start.xi.or_else(|| usable.then(|| closest_parameter(path.as_ref(), position, true)))?;
@@ -77,13 +78,13 @@ pub(super) fn check_vehicle(
 
 /// The vehicle's place in the pattern.
 fn check_pattern(faults: &mut Collector<'_>, file: &MissionFile, key: &str, section: &VehicleSection) -> Pattern {
-    faults.finite(&format!("{key}.pattern"), section.pattern, "units of xi");
+    faults.magnitude(&format!("{key}.pattern"), section.pattern, LARGEST_XI, "units of xi");
     let Some(motion) = section.pattern_motion else { return Pattern::constant(section.pattern) };
     let key = format!("{key}.pattern_motion");
-    faults.finite(&format!("{key}.amplitude"), motion.amplitude, "units of xi");
+    faults.magnitude(&format!("{key}.amplitude"), motion.amplitude, LARGEST_XI, "units of xi");
     let ok = (1e-3..=1e9).contains(&motion.period_s);
     faults.number(&format!("{key}.period_s"), motion.period_s, ok, "0.001 to 1000000000 s");
-    faults.finite(&format!("{key}.phase_deg"), motion.phase_deg, "deg");
+    faults.magnitude(&format!("{key}.phase_deg"), motion.phase_deg, LARGEST_ANGLE, "deg");
     if !matches!(file.coordination.law, LawChoice::MovingPattern(_)) {
         let found = format!("a pattern that moves, under {}", build::law_name(&file.coordination.law));
         faults.fault(&key, found, "a constant pattern for this law, or the law moving_pattern (3.70)");
@@ -120,7 +121,7 @@ fn check_fit(
     model: &ModelChoice,
     following: &FollowingChoice,
     law: Option<&dyn FleetLaw>,
-    path: &dyn Path,
+    path: Option<&dyn Path>,
 ) -> bool {
     let (fits, law_of_model) = match (model, following) {
         (ModelChoice::KinematicUnicycle, FollowingChoice::LineOfSight(_))
@@ -169,7 +170,7 @@ fn check_fit(
     }
     ok &= check_auxiliary(faults, section, file, key, following);
     let path_key = format!("{key}.path.{}", path_name(&section.path));
-    if let Some(at) = path.tangent_breaks().first() {
+    if let Some(at) = path.and_then(|path| path.tangent_breaks().first().copied()) {
         let found = format!("a path whose direction jumps at xi = {at}");
         faults.fault(&path_key, found, format!("a path with a continuous tangent for {}", following_name(following)));
         ok = false;
@@ -183,7 +184,9 @@ fn check_fit(
         faults.fault(&path_key, "a chain, whose curvature jumps from piece to piece", allowed);
         ok = false;
     }
-    if !matches!(model, ModelChoice::UnderactuatedAuv(_)) && !crate::path::shape::is_planar(path) {
+    if !matches!(model, ModelChoice::UnderactuatedAuv(_))
+        && path.is_some_and(|path| !crate::path::shape::is_planar(path))
+    {
         let found = format!("a path that leaves the plane for a {}", model_name(model));
         faults.fault(&path_key, found, "a line, circle, sinusoid or chain, or waypoints of one height");
         ok = false;

@@ -65,7 +65,10 @@ pub(super) fn check_links(
     let pairs = network.links.iter().enumerate().map(|(i, pair)| (format!("network.links[{i}]"), pair, true));
     let one_way = network.one_way.iter().enumerate().map(|(i, pair)| (format!("network.one_way[{i}]"), pair, false));
     for (key, pair, both_ways) in pairs.chain(one_way) {
-        let Some((a, b)) = resolve(faults, &key, pair, ids) else { continue };
+        let Some((a, b)) = resolve(faults, &key, pair, ids) else {
+            faults.links_in_doubt = true;
+            continue;
+        };
         for (from, to) in [(a, b), (b, a)].into_iter().take(if both_ways { 2 } else { 1 }) {
             if links.iter().any(|link| (link.from, link.to) == (from, to)) {
                 faults.fault(&key, format!("a second link from {} to {}", pair[0], pair[1]), "each link once");
@@ -83,7 +86,7 @@ pub(super) fn check_links(
     let arcs: Vec<(usize, usize)> = links.iter().map(|link| (link.to, link.from)).collect();
     if (2..=MOST_VEHICLES).contains(&n) && !Graph::from_arcs(n, &arcs).can_agree() {
         let allowed = "links by which at least one vehicle's word can reach every other (a globally reachable vertex)";
-        faults.fault("network.links", "a graph that can never be connected", allowed);
+        faults.fault_of_links("network.links", "a graph that can never be connected", allowed);
     }
     Some(links)
 }
@@ -165,7 +168,7 @@ fn link_of(
     let index = links.iter().position(|link| (link.from, link.to) == (from, to));
     if index.is_none() {
         let found = format!("{} -> {}, which is not a link", pair[0], pair[1]);
-        faults.fault(key, found, "a link of network.links or network.one_way");
+        faults.fault_of_links(key, found, "a link of network.links or network.one_way");
     }
     index
 }

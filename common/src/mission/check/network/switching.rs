@@ -192,7 +192,7 @@ fn check_in_mean(
         Ok(signal) => Some(signal),
         Err(Some(shortest)) => {
             let allowed = format!("at least {} s: four dwells for each link that is needed", shortest.secs());
-            faults.fault(&format!("{key}.window_s"), format!("{} s", choice.window_s), allowed);
+            faults.fault_of_links(&format!("{key}.window_s"), format!("{} s", choice.window_s), allowed);
             Some(Switching::always(arcs.len()))
         }
         // The links are at fault, and are told so by their own check.
@@ -226,7 +226,11 @@ fn check_trace(
     for (index, link) in scope.links.iter().enumerate() {
         if !told[index] && only.is_none_or(|only| only.contains(&index)) {
             let found = format!("nothing about {}", link.layers[0].stream);
-            faults.fault(&format!("{key}.links"), found, "every directed link, with up_s = [] if it was never up");
+            faults.fault_of_links(
+                &format!("{key}.links"),
+                found,
+                "every directed link, with up_s = [] if it was never up",
+            );
         }
     }
     if only.is_none() {
@@ -255,6 +259,6 @@ fn check_union(faults: &mut Collector<'_>, scope: &Scope<'_>, up: &[UpInterval],
     let n = scope.vehicles;
     if (2..=MOST_VEHICLES).contains(&n) && !scope.links.is_empty() && !Graph::from_arcs(n, &arcs).can_agree() {
         let allowed = "links that come up by which at least one vehicle's word can reach every other";
-        faults.fault(key, "a graph that can never be connected", allowed);
+        faults.fault_of_links(key, "a graph that can never be connected", allowed);
     }
 }
