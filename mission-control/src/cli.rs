@@ -557,15 +557,24 @@ fn status(json: bool, endpoint: &Endpoint) -> Ended {
             let vehicles: Vec<_> = status
                 .vehicles
                 .iter()
-                .map(|v| serde_json::json!({"id": v.id, "connected": v.connected, "phase": v.phase.as_str(), "reason": v.reason}))
+                .map(|v| {
+                    let said = v.said.map(|(made, xi)| serde_json::json!({"t_s": made.secs(), "xi": xi}));
+                    serde_json::json!({
+                        "id": v.id, "connected": v.connected, "phase": v.phase.as_str(), "reason": v.reason, "said": said,
+                    })
+                })
                 .collect();
             let [sent, delivered, dropped, in_flight] = status.messages;
+            let monitor = Mission::parse("the mission", &status.mission)
+                .ok()
+                .and_then(|mission| theory::so_far(&mission, &status));
             bus::tell!(
                 "{:#}",
                 serde_json::json!({
                     "phase": status.phase.as_str(), "now_s": status.now.secs(), "end_s": status.end.secs(),
                     "speed": status.speed, "vehicles": vehicles,
                     "messages": {"sent": sent, "delivered": delivered, "dropped": dropped, "in_flight": in_flight},
+                    "monitor": monitor,
                 })
             );
         } else {

@@ -12,7 +12,7 @@ use common::record::Record;
 use serde::Serialize;
 
 use crate::facts::facts;
-use crate::results::{Account, Summary, write_run_folder};
+use crate::results::{Account, Summary, Theory, write_run_folder};
 use crate::theory;
 
 /// Names of the files in a run folder.
@@ -127,7 +127,11 @@ pub fn report(folder: &Path, notes: Vec<String>) -> Result<Summary, String> {
     facts.duration_s = flown.map_or(facts.duration_s, |t| (t as f64 / 1e9).min(facts.duration_s));
     let reproduce = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
     let account = Account { notes, reproduce };
-    write_run_folder(folder, &recording, &facts, |summary| theory::rows(&mission, Some(summary)), &account)
+    let theory = |summary: &Summary| Theory {
+        rows: theory::rows(&mission, Some(summary)),
+        envelope: theory::guarantee_of_flight(&mission, summary).map(|guarantee| (guarantee.rate, guarantee.factor)),
+    };
+    write_run_folder(folder, &recording, &facts, theory, &account)
         .map_err(|error| format!("cannot write the report: {error}"))
 }
 

@@ -195,7 +195,9 @@ mod tests {
             stretch: 0.31,
             bend: 0.005,
         };
-        let Some(PathFollowing::TypeI { lambda_1, rho_1, alpha_1 }) = vehicle.type_1() else { panic!("positive gains") };
+        let Some(PathFollowing::TypeI { lambda_1, rho_1, alpha_1 }) = vehicle.type_1() else {
+            panic!("positive gains")
+        };
         assert!(alpha_1 == 0.5 && lambda_1 < 2.0 * 0.5 / 7.6 && rho_1 > 0.0);
         // W_4' + λ_1W_4 − ρ_1v² with the worst masses is negative wherever one looks (z_2 = η = δ = 0).
         let (m, b) = (7.6, 0.5 * 7.6 * 0.005 + 0.5 * 0.31);

@@ -11,8 +11,8 @@
 //! quarter of the shortest time that a link is up, and σh ≤ 1/4, where σ bounds the eigenvalues of KL_p. Then the term
 //! that KL_p γ~ is made of differs from the present one by at most what it changes within h: by the part σh of itself.
 //! To first order the fleet acts as one whose gains are smaller by that part, and by the part of the up times in which
-//! nothing was heard yet. So a promised rate r is held against the errors as (1 − σh)(1 − u)r ([`Tolerance::slower`]). Where
-//! old states are not advanced, neighbours seem to be behind by v_L h each; the part of that which differs between vehicles
+//! nothing was heard yet. So a promised rate r is held against the errors as (1 − σh)(1 − u)r ([`Tolerance::slower`]), from h
+//! after the start on, before which nobody need have heard anything ([`Tolerance::late`]). Where old states are not advanced, neighbours seem to be behind by v_L h each; the part of that which differs between vehicles
 //! leaves an error of up to v_L h √n D/λ, with D the most neighbours of anybody and λ the connectivity
 //! ([`Tolerance::added`]).
 
@@ -151,16 +151,22 @@ impl Envelope {
 /// What messages in periods may cost, see the head of this file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Tolerance {
+    /// How much later the decay may begin \[s\].
+    pub late: f64,
     /// The part by which a rate may be smaller, in \[0, 1).
     pub slower: f64,
     /// What may be added to an error.
     pub added: f64,
 }
 
+/// What rounding may add to an error, as a part of it.
+const ROUNDING: f64 = 1e-9;
+
 impl Tolerance {
     /// The most that an error may be at `t` seconds after it was `initial`.
     pub fn allowed(&self, envelope: &Envelope, initial: f64, t: f64) -> f64 {
-        envelope.factor * (-envelope.rate * (1.0 - self.slower) * t).exp() * initial + self.added
+        let decayed = (-envelope.rate * (1.0 - self.slower) * (t - self.late).max(0.0)).exp();
+        envelope.factor * decayed * initial * (1.0 + ROUNDING) + self.added
     }
 }
 
@@ -353,7 +359,7 @@ impl Watch {
             .filter(|lambda| *lambda > 0.0);
         let n = graphs.first().map_or(0, Graph::len) as f64;
         let left = lambda.map_or(0.0, |lambda| n.sqrt() * most_neighbours(graphs) as f64 / lambda);
-        Tolerance { slower, added: drift.abs() * age.secs() * left }
+        Tolerance { late: age.secs(), slower, added: drift.abs() * age.secs() * left }
     }
 
     /// Judges the errors measured over time, as (t \[s\], ‖e‖), the first one the error at the start.
@@ -462,7 +468,7 @@ mod tests {
         assert_eq!(watch.covered_by, Some("Theorem 4.4"));
         let envelope = watch.envelope.expect("a rate");
         assert!((envelope.rate - 0.025).abs() < 1e-12 && envelope.factor > 1.0);
-        let a_little = Tolerance { slower: 0.0, added: 1e-9 };
+        let a_little = Tolerance { added: 1e-9, ..Tolerance::default() };
         // What the law does: the slowest mode decays at k λ_2 = 0.1 while the links are up.
         let errors: Vec<(f64, f64)> = (0..=1000)
             .map(|i| f64::from(i) * 0.1)
@@ -589,7 +595,8 @@ mod tests {
         let (_, seen) = row_of_three(10.0, 100.0);
         let graphs = [Graph::complete(3)];
         // Remark 4.2 with K = I: ρ_1 < 1/18 for λ_1 = 1, α_1 = ½, the least λ_m being that of all graphs.
-        let watched = |rho_1| Watched::Agreement(vec![1.0; 3], PathFollowing::TypeI { lambda_1: 1.0, rho_1, alpha_1: 0.5 });
+        let watched =
+            |rho_1| Watched::Agreement(vec![1.0; 3], PathFollowing::TypeI { lambda_1: 1.0, rho_1, alpha_1: 0.5 });
         let weak = watch(&watched(0.01), &graphs, seen, Vec::new());
         assert_eq!((weak.covered_by, weak.envelope), (Some("Theorem 4.4 (type I)"), None));
         let strong = watch(&watched(5.0), &graphs, seen, Vec::new());

@@ -1,102 +1,191 @@
-//! The theorem monitor over a mission: a flight that is over, or one so far.
+//! The theorem monitor over a flight that is over.
+//!
+//! Laws of chapter 4 are held against Theorems 4.4 and 4.5, Lemma 4.7, or Lemmas 4.4 and 4.5, with the switching signal as
+//! measured. Of the others, what their own statements say is repeated in the monitor's words.
 
 use common::mission::Mission;
-use common::mission::file::LawChoice;
-use common::theory::monitor::{self, Judgement, Seen, Watch, Watched};
-use common::time::{Span, Time};
+use common::mission::file::Between;
+use common::theory::monitor::{self, Exchange, Judgement, Premise, Seen, Tolerance, Watch};
+use common::time::Span;
 
-use super::Case;
-use super::network::Network;
-use super::switching::moves_as_told;
-use crate::results::{Summary, TheoryRow};
+use super::premises::{Looked, looked_for};
+use super::{Case, Guarantee, guarantee_of, law_rows};
+use crate::results::{Absence, Connectivity, Summary, TheoryRow};
 
-/// What the monitor watches in this mission; `None` if it has no statement about its law, or if a premise that is
-/// not about the switching is missing (other rows say so).
-fn watched(mission: &Mission, network: &Network) -> Option<Watched> {
-    let n = mission.vehicles.len();
-    match &mission.law_choice {
-        LawChoice::Switching(law) if network.immediate && moves_as_told(mission) => {
-            Some(Watched::Agreement(vec![law.gain; n]))
-        }
-        LawChoice::AuxiliarySwitching(law) if network.immediate && moves_as_told(mission) => {
-            Some(Watched::Dynamic(law.a1, law.a2))
-        }
-        LawChoice::DelayedWithLosses(_) => Some(Watched::Delayed),
-        LawChoice::Delayed(_) if network.leaves_nobody_alone() => Some(Watched::Delayed),
-        _ => None,
-    }
-}
+/// Asked of every fleet.
+const PRESENT: &str = "every vehicle all the time";
 
-/// What sampling may add to the errors: neighbours are heard up to a message period and two control periods late, and a
-/// fleet at v_L has moved on by then.
-fn tolerance(mission: &Mission, summary: &Summary) -> f64 {
-    let period = mission.control_period.secs();
-    let late = period * (mission.message_ticks as f64 + 2.0);
-    let n = mission.vehicles.len() as f64;
-    n * late * mission.speed.fastest() + 0.01 * summary.fleet.coordination.initial
-}
-
-/// After a flight: covered, not covered, or a defect.
+/// After a flight: covered, not covered, or a defect; `None` for a fleet of one.
 pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
-    let summary = case.summary?;
-    let network = &case.network;
-    let watched = watched(case.mission, network)?;
-    let measured = summary.fleet.connectivity.as_ref()?;
-    let planned = Seen::of(&network.planned)?;
-    let length = Span::from_secs(summary.duration_s);
-    let seen = Seen {
-        length,
-        alpha: measured.alpha,
-        t_0: measured.t_0_s.map(Span::from_secs),
-        dwell: planned.dwell,
-        mean: measured.t_s.map(Span::from_secs),
+    let summary = case.summary.filter(|_| case.mission.vehicles.len() > 1)?;
+    let absences = &summary.fleet.absences;
+    let Some(looked) = looked_for(case.mission, &case.network) else { return Some(of_other_laws(case, absences)) };
+    let Some(seen) = summary.fleet.connectivity.as_ref().and_then(|measured| seen(case.mission, measured, &looked))
+    else {
+        return Some(nothing_seen());
     };
-    let watch = monitor::watch(&watched, &network.graphs, seen);
-    let series = &summary.fleet.coordination.series;
-    let errors: Vec<(f64, f64)> = series.t_s.iter().copied().zip(series.norm.iter().copied()).collect();
-    let judged = watch.judge(&errors, tolerance(case.mission, summary));
+    let broken = looked.broken.iter().cloned().chain(absent(absences)).collect();
+    let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
+    let tolerance = tolerance(case, &watch, &looked);
+    let judged = watch.judge(&errors(summary, f64::INFINITY), tolerance);
     Some(TheoryRow {
-        name: "Theorem monitor: the network as measured, the error over time".into(),
-        condition: "a statement covers the fleet, and its errors stay within what it promises".into(),
-        value: margins(&watch),
+        value: format!("{}; {}", network_words(&watch), margins(&watch)),
         holds: Some(matches!(judged, Judgement::Covered { .. })),
-        predicted: watch.envelope.as_ref().map_or("–".into(), |envelope| {
-            format!("‖e(t)‖ ≤ {:.3} e^(−{:.5} t) ‖e(0)‖ ({})", envelope.factor, envelope.rate, envelope.statement)
-        }),
+        predicted: promise(&watch, tolerance),
         guaranteed_rate: watch.envelope.as_ref().map(|envelope| envelope.rate),
-        measured: judged.to_string(),
+        measured: format!("{judged}{}", before_absence(case, &looked).unwrap_or_default()),
+        ..empty()
     })
 }
 
-fn margins(watch: &Watch) -> String {
+/// What is guaranteed for the network as it was: the monitor's envelope, or what other laws' statements promise.
+pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guarantee> {
+    let case = Case::new(mission, Some(summary));
+    let Some(looked) = looked_for(mission, &case.network) else { return guarantee_of(&case) };
+    let seen = seen(mission, summary.fleet.connectivity.as_ref()?, &looked)?;
+    let broken = looked.broken.iter().cloned().chain(absent(&summary.fleet.absences)).collect();
+    let envelope = monitor::watch(&looked.watched, &case.network.graphs, seen, broken).envelope?;
+    Some(Guarantee { rate: envelope.rate, factor: Some(envelope.factor) }).filter(|guarantee| guarantee.rate > 0.0)
+}
+
+/// What a law was told of the delay is not age; the control period is.
+pub(super) fn age(mission: &Mission, oldest: Span, told: Span) -> Span {
+    // What is heard in a control period is used by the next one, and its output held for one more.
+    Span::from_nanos((oldest.nanos() - told.nanos()).max(0)) + mission.control_period * 2
+}
+
+fn seen(mission: &Mission, measured: &Connectivity, looked: &Looked) -> Option<Seen> {
+    let length = Span::from_secs(measured.length_s);
+    (length > Span::ZERO).then(|| Seen {
+        length,
+        alpha: measured.alpha,
+        t_0: measured.t_0_s.map(Span::from_secs),
+        dwell: Span::from_secs(measured.dwell_s),
+        mean: measured.t_s.map(Span::from_secs),
+        exchange: Some(Exchange {
+            // Where nothing was heard, nothing is old; the unheard part says it.
+            age: age(mission, measured.oldest_news_s.map_or(Span::ZERO, Span::from_secs), looked.told)
+                .max(mission.control_period * mission.message_ticks),
+            shortest_up: Span::from_secs(measured.shortest_up_s),
+            unheard: measured.unheard,
+        }),
+    })
+}
+
+fn errors(summary: &Summary, until_s: f64) -> Vec<(f64, f64)> {
+    let series = &summary.fleet.coordination.series;
+    series.t_s.iter().copied().zip(series.norm.iter().copied()).filter(|(t, _)| *t <= until_s).collect()
+}
+
+/// How fast a neighbour seems to fall behind while nothing new is heard of it.
+pub(super) fn drift(mission: &Mission) -> f64 {
+    if mission.between == Between::Hold { mission.speed.fastest() } else { 0.0 }
+}
+
+fn tolerance(case: &Case<'_>, watch: &Watch, looked: &Looked) -> Tolerance {
+    watch.tolerance(&looked.watched, &case.network.graphs, drift(case.mission))
+}
+
+/// The premise that vehicles which were silent at times do not meet.
+fn absent(absences: &[Absence]) -> Option<Premise> {
+    let words = |absence: &Absence| {
+        format!("{} is silent from {:.1} s to {:.1} s", absence.vehicle, absence.from_s, absence.to_s)
+    };
+    let first = absences.first()?;
+    let more = if absences.len() > 1 { format!(" ({} more times)", absences.len() - 1) } else { String::new() };
+    Some(Premise { asks: PRESENT, found: format!("{}{more}", words(first)) })
+}
+
+/// What can be said of the flight before the first vehicle fell silent.
+fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
+    let summary = case.summary?;
+    let first = summary.fleet.absences.first()?;
+    let seen = seen(case.mission, summary.fleet.connectivity_before.as_ref()?, looked)?;
+    let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, looked.broken.clone());
+    let judged = watch.judge(&errors(summary, first.from_s), tolerance(case, &watch, looked));
+    Some(format!("; judged until {:.1} s alone: {judged}", first.from_s))
+}
+
+/// A law that no statement about switching networks speaks of.
+fn of_other_laws(case: &Case<'_>, absences: &[Absence]) -> TheoryRow {
+    let rows = law_rows(case);
+    let spoken: Vec<&TheoryRow> = rows.iter().filter(|row| row.holds.is_some()).collect();
+    let absent = absent(absences);
+    let names = spoken.iter().map(|row| row.name.as_str()).collect::<Vec<_>>().join("; ");
+    let failing: Vec<String> = absent
+        .iter()
+        .map(ToString::to_string)
+        .chain(
+            spoken
+                .iter()
+                .filter(|row| row.holds == Some(false))
+                .map(|row| format!("{} asks for {}, and here: {}", row.name, row.condition, or_nothing(&row.value))),
+        )
+        .collect();
+    let (holds, measured) = match (spoken.is_empty(), failing.is_empty()) {
+        (true, true) => (None, "not covered: no statement speaks of a law without coordination".to_string()),
+        (_, false) => (Some(false), format!("not covered: {}", failing.join("; "))),
+        (false, true) => (Some(true), format!("covered by {names}, without an envelope")),
+    };
+    let value = case.summary.and_then(|summary| summary.fleet.connectivity.as_ref()).map_or("–".into(), measured_words);
+    TheoryRow {
+        value: match names.is_empty() {
+            true => value,
+            false => format!("{value}; Theorems 4.4 and 4.5 do not speak of this law, but this does: {names}"),
+        },
+        holds,
+        guaranteed_rate: None,
+        measured,
+        ..empty()
+    }
+}
+
+fn or_nothing(value: &str) -> &str {
+    if value.is_empty() { "nothing known" } else { value }
+}
+
+fn nothing_seen() -> TheoryRow {
+    TheoryRow { holds: Some(false), measured: "not covered: nothing was recorded".into(), ..empty() }
+}
+
+fn empty() -> TheoryRow {
+    TheoryRow {
+        name: "Theorem monitor: the network as measured, the error over time".into(),
+        condition: "a statement covers the fleet, and its errors stay within what it promises".into(),
+        predicted: "–".into(),
+        ..TheoryRow::default()
+    }
+}
+
+fn promise(watch: &Watch, tolerance: Tolerance) -> String {
+    watch.envelope.as_ref().map_or("–".into(), |envelope| {
+        let rate = envelope.rate * (1.0 - tolerance.slower);
+        let added = if tolerance.added > 0.0 { format!(" and {:.3} more", tolerance.added) } else { String::new() };
+        format!(
+            "‖e(t)‖ ≤ {:.3} e^(−{:.5} t) ‖e(0)‖ ({}); as messages come in periods, {rate:.5} 1/s from {} on{added} will do",
+            envelope.factor, envelope.rate, envelope.statement, Span::from_secs(tolerance.late)
+        )
+    })
+}
+
+fn measured_words(measured: &Connectivity) -> String {
+    let t_0 = measured.t_0_s.map_or("unbounded".to_string(), |t_0| format!("{t_0:.3} s"));
+    let mean = measured.t_s.map_or("not connected in mean".to_string(), |t| format!("T = {t:.3} s"));
+    format!("α = {:.4}, T₀ = {t_0}, dwell time {:.3} s, {mean}", measured.alpha, measured.dwell_s)
+}
+
+/// The network as seen.
+pub(super) fn network_words(watch: &Watch) -> String {
+    let Seen { alpha, t_0, dwell, mean, .. } = watch.seen;
+    let t_0 = t_0.map_or("unbounded".to_string(), |t_0| format!("{:.3} s", t_0.secs()));
+    let mean = mean.map_or("not connected in mean".to_string(), |mean| format!("T = {:.3} s", mean.secs()));
+    format!("α = {alpha:.4}, T₀ = {t_0}, dwell time {:.3} s, {mean}", dwell.secs())
+}
+
+/// Every condition with its value and its limit.
+pub(super) fn margins(watch: &Watch) -> String {
     let words = watch.margins.iter().map(|margin| {
         format!("{}: {} = {:.4}, limit {:.4}", margin.statement, margin.quantity, margin.value, margin.limit)
     });
     words.collect::<Vec<_>>().join("; ")
-}
-
-/// For a fleet under way, the switching signal up to `now`: what theory says so far. The signal is that of the mission,
-/// which the emulator plays; `None` if there is nothing to say yet, or no statement about the mission's law.
-pub fn so_far(mission: &Mission, now: Time) -> Option<String> {
-    let mut flown = mission.clone();
-    flown.end = now.min(mission.end);
-    if flown.end <= Time::ZERO || mission.vehicles.len() < 2 {
-        return None;
-    }
-    let network = Network::of(&flown);
-    let seen = Seen::of(&network.planned)?;
-    let t_0 = seen.t_0.map_or("unbounded".to_string(), |t_0| t_0.to_string());
-    let mean = seen.mean.map_or("not connected in mean".to_string(), |mean| format!("T = {mean}"));
-    let network_words = format!("network so far: α = {:.4}, T₀ = {t_0}, {mean}", seen.alpha);
-    let Some(watched) = watched(&flown, &network) else { return Some(network_words) };
-    let watch = monitor::watch(&watched, &network.graphs, seen);
-    Some(match (&watch.covered_by, &watch.envelope) {
-        (Some(_), Some(envelope)) => format!(
-            "{network_words}; covered by {}: errors are at most {:.3e} of those at the start",
-            envelope.statement,
-            envelope.at(flown.end.secs())
-        ),
-        (Some(statement), None) => format!("{network_words}; covered by {statement}"),
-        (None, _) => format!("{network_words}; {}", watch.judge(&[], 0.0)),
-    })
 }
