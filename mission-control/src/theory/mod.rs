@@ -46,7 +46,7 @@ use common::theory::linear_coordination::Law;
 pub use figures::figures;
 pub use so_far::{SoFar, so_far};
 pub use talk::speed_factor;
-pub use watched::guarantee_of_flight;
+pub use watched::{envelope_over, guarantee_of_flight};
 
 use crate::results::{Summary, TheoryRow};
 use network::Network;

@@ -21,10 +21,10 @@ pub(super) struct Looked {
 /// What the monitor looks for; `None` if no statement about switching networks speaks of the mission's law.
 pub(super) fn looked_for(mission: &Mission, network: &Network) -> Option<Looked> {
     let n = mission.vehicles.len();
-    let at_once = || late_or_lost(mission, Span::ZERO);
+    let at_once = || late_or_lost(mission, Span::ZERO).into_iter().collect::<Vec<Premise>>();
     let (watched, mut broken, told) = match &mission.law_choice {
         LawChoice::Switching(law) => {
-            let mut broken: Vec<Premise> = at_once();
+            let mut broken = at_once();
             let following = following(mission).unwrap_or_else(|premise| {
                 broken.push(premise);
                 PathFollowing::TypeII { lambda_1: f64::INFINITY }
@@ -53,7 +53,7 @@ pub(super) fn looked_for(mission: &Mission, network: &Network) -> Option<Looked>
 
 /// What section 4.4 asks for besides connectedness in mean.
 pub(super) fn premises_of_late_news(mission: &Mission, network: &Network, told: Span) -> Vec<Premise> {
-    let mut broken = late_or_lost(mission, told);
+    let mut broken: Vec<Premise> = late_or_lost(mission, told).into_iter().collect();
     broken.extend(not_as_told(mission));
     // (4.34) says nothing of a vehicle that hears nobody; (4.42) does.
     if matches!(mission.law_choice, LawChoice::Delayed(_)) && !network.leaves_nobody_alone() {
@@ -64,7 +64,7 @@ pub(super) fn premises_of_late_news(mission: &Mission, network: &Network, told: 
 }
 
 /// What is in the way of messages that all take `told` and are lost by the switching alone.
-pub(super) fn late_or_lost(mission: &Mission, told: Span) -> Vec<Premise> {
+pub(super) fn late_or_lost(mission: &Mission, told: Span) -> Option<Premise> {
     let mut found = Vec::new();
     if mission.medium.is_some() {
         found.push("vehicles share a medium, which delays and drops them".to_string());
@@ -98,7 +98,7 @@ pub(super) fn late_or_lost(mission: &Mission, told: Span) -> Vec<Premise> {
     } else {
         "messages that arrive at once, and are lost by the switching alone"
     };
-    found.into_iter().map(|found| Premise { asks, found }).collect()
+    (!found.is_empty()).then(|| Premise { asks, found: found.join(", ") })
 }
 
 /// Whether the virtual targets move at exactly the rate the law asks for (path following of type II, η = 0).

@@ -92,7 +92,7 @@ fn two_way(case: &Case<'_>) -> bool {
 /// What is in the way of both theorems.
 fn obstacles(case: &Case<'_>) -> String {
     let mut obstacles = String::new();
-    for premise in late_or_lost(case.mission, common::time::Span::ZERO) {
+    if let Some(premise) = late_or_lost(case.mission, common::time::Span::ZERO) {
         obstacles += &format!("; messages: {}", premise.found);
     }
     if let Err(premise) = following(case.mission) {

@@ -3,11 +3,13 @@
 //! Laws of chapter 4 are held against Theorems 4.4 and 4.5, Lemma 4.7, or Lemmas 4.4 and 4.5, with the switching signal as
 //! measured. Of the others, what their own statements say is repeated in the monitor's words.
 
+use common::graph::Graph;
 use common::mission::Mission;
 use common::mission::file::Between;
-use common::theory::monitor::{self, Exchange, Judgement, Premise, Seen, Tolerance, Watch};
+use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch};
 use common::time::Span;
 
+use super::network::Network;
 use super::premises::{Looked, looked_for};
 use super::{Case, Guarantee, guarantee_of, law_rows};
 use crate::results::{Absence, Connectivity, Summary, TheoryRow};
@@ -46,6 +48,25 @@ pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guara
     let broken = looked.broken.iter().cloned().chain(absent(&summary.fleet.absences)).collect();
     let envelope = monitor::watch(&looked.watched, &case.network.graphs, seen, broken).envelope?;
     Some(Guarantee { rate: envelope.rate, factor: Some(envelope.factor) }).filter(|guarantee| guarantee.rate > 0.0)
+}
+
+/// What theory promises a mission on every switching signal over these graphs with this α, T_0 and dwell time, `length` long.
+///
+/// # Errors
+/// Why it promises no envelope.
+pub fn envelope_over(
+    mission: &Mission,
+    graphs: &[Graph],
+    (alpha, t_0, dwell): (f64, Span, Span),
+    length: Span,
+) -> Result<Envelope, String> {
+    let network = Network::of(mission);
+    let looked = looked_for(mission, &network).ok_or_else(|| {
+        "Theorem 4.4 and Lemma 4.7, which bound errors for such signals, do not speak of this law".to_string()
+    })?;
+    let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: None, exchange: None };
+    let watch = monitor::watch(&looked.watched, graphs, seen, looked.broken);
+    watch.envelope.ok_or_else(|| watch.judge(&[], Tolerance::default()).to_string())
 }
 
 /// What a law was told of the delay is not age; the control period is.
