@@ -699,10 +699,19 @@ fn search(args: &WorstArgs) -> Ended {
     bus::tell!("  as the mission is     {:.4e}", found.as_written);
     bus::tell!("  worst signal found    {:.4e}, a decay at {:.5} 1/s", found.worst, found.rate);
     match (found.bound, found.guaranteed_rate, found.statement) {
-        (Some(bound), Some(rate), Some(statement)) => bus::tell!(
-            "  {statement} allows {bound:.4e} {when}, a decay at {rate:.5} 1/s: {:.3} times the worst found",
-            bound / found.worst
-        ),
+        (Some(bound), Some(rate), Some(statement)) => {
+            let beyond = match found.within {
+                Some(false) => "; the worst found is beyond that: a defect",
+                _ if found.worst > bound => {
+                    "; what the worst found is beyond that is within messages in periods and rounding"
+                }
+                _ => "",
+            };
+            bus::tell!(
+                "  {statement} allows {bound:.4e} {when}, a decay at {rate:.5} 1/s: {:.3} times the worst found{beyond}",
+                bound / found.worst
+            );
+        }
         _ => bus::tell!("  no theorem bounds it: {}", found.no_bound.as_deref().unwrap_or("none speaks of it")),
     }
     bus::tell!("saved: {}", found.saved.display());

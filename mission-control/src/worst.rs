@@ -64,6 +64,8 @@ pub struct Worst {
     pub rate: f64,
     /// What theory allows of what counts as hurt, if it speaks about the mission.
     pub bound: Option<f64>,
+    /// Whether the worst found is within it, with what messages in periods and rounding may add; else there is a defect.
+    pub within: Option<bool>,
     /// The statement that does.
     pub statement: Option<&'static str>,
     /// The rate that it guarantees \[1/s\].
@@ -212,7 +214,12 @@ pub fn worst(
     std::fs::write(out, head + &text).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
     let length = mission.end - Time::ZERO;
     let promise = theory::envelope_over(mission, signals.graphs(), (alpha, t_0, dwell), length);
-    let bound = promise.as_ref().ok().map(|envelope| initial * most(envelope, quest.hurt, length.secs()));
+    let bound = promise.as_ref().ok().map(|(envelope, _)| initial * most(envelope, quest.hurt, length.secs()));
+    let within = promise.as_ref().ok().map(|(envelope, tolerance)| {
+        let slower = Envelope { rate: envelope.rate * (1.0 - tolerance.slower), ..*envelope };
+        let late = (slower.rate * tolerance.late).exp();
+        worst <= initial * late * most(&slower, quest.hurt, length.secs()) + tolerance.added
+    });
     Ok(Worst {
         initial,
         hurt: quest.hurt,
@@ -220,8 +227,9 @@ pub fn worst(
         worst,
         rate: (initial / end).ln() / mission.end.secs(),
         bound,
-        statement: promise.as_ref().ok().map(|envelope| envelope.statement),
-        guaranteed_rate: promise.as_ref().ok().map(|envelope| envelope.rate),
+        within,
+        statement: promise.as_ref().ok().map(|(envelope, _)| envelope.statement),
+        guaranteed_rate: promise.as_ref().ok().map(|(envelope, _)| envelope.rate),
         no_bound: promise.err(),
         flights,
         saved: out.to_path_buf(),
@@ -352,7 +360,7 @@ mod tests {
         let quest = Quest { allowance: allowance(0.5, 5.0, 2.5), hurt: Hurt::Mean, flights: 6, seed: 1 };
         let found = worst(&mission(&short), &quest, "m.toml", &folder.path().join("m.toml"), |_| {}).expect("found");
         assert_eq!(found.statement, Some("Lemma 4.7"));
-        assert!(found.bound.is_some_and(|bound| bound > found.worst), "{found:?}");
+        assert!(found.bound.is_some_and(|bound| bound > found.worst) && found.within == Some(true), "{found:?}");
     }
 
     #[test]

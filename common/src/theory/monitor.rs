@@ -37,6 +37,9 @@ pub struct Exchange {
     pub unheard: f64,
 }
 
+/// What conditions on messages in periods are filed under.
+const IN_PERIODS: &str = "messages in periods";
+
 /// The most that age over shortest up time, and the unheard part, may be.
 const SMALL: f64 = 0.25;
 
@@ -105,8 +108,8 @@ impl std::fmt::Display for Margin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Margin { statement, quantity, value, limit } = self;
         match value.is_finite() {
-            true => write!(f, "{statement} asks for {quantity} < {limit:.4}, and it is {value:.4}")?,
-            false => write!(f, "{statement} asks for {quantity} < {limit:.4}, and it is unbounded")?,
+            true => write!(f, "{statement}: {quantity} must be below {limit:.4}, and it is {value:.4}")?,
+            false => write!(f, "{statement}: {quantity} must be below {limit:.4}, and it is unbounded")?,
         }
         if !self.holds() && value.is_finite() && *value > *limit {
             write!(f, " ({:.4} too much)", -self.left())?;
@@ -275,7 +278,7 @@ impl Watch {
                 const NAME: &str = "Theorem 4.4 (type I)";
                 let coupled = rho_1 / (alpha_1 * lambda_1);
                 let weakly = self.asks(NAME, "ρ₁/(α₁λ₁)", coupled, coordination.k_g());
-                // λ_0 may be negative where the coupling is too strong.
+                // Too strong a coupling leaves no loss rate to bear.
                 if self.asks(NAME, "α", alpha, coordination.alpha_limit(following)) && weakly {
                     self.promises(NAME, None);
                 }
@@ -329,13 +332,19 @@ impl Watch {
         self.asks(statement, "T [s]", waited, self.seen.length.secs())
     }
 
+    /// The conditions on messages in periods that do not hold.
+    pub fn too_rare(&self) -> Vec<String> {
+        let failing = self.margins.iter().filter(|margin| margin.statement == IN_PERIODS && !margin.holds());
+        failing.map(ToString::to_string).collect()
+    }
+
     /// Whether messages in periods are close enough to hearing one another all the time.
     fn exchange(&mut self, speed: f64) -> bool {
-        const NAME: &str = "exchange in periods";
         let Some(Exchange { age, shortest_up, unheard }) = self.seen.exchange else { return true };
-        let fresh = self.asks(NAME, "age of news [s]", age.secs(), SMALL * shortest_up.secs());
-        let calm = self.asks(NAME, "age of news × largest eigenvalue of KL", age.secs() * speed, 1.0);
-        let heard = self.asks(NAME, "unheard part of a link's up time", unheard, SMALL);
+        let fresh = self.asks(IN_PERIODS, "age of news [s]", age.secs(), SMALL * shortest_up.secs());
+        let calm =
+            speed == 0.0 || self.asks(IN_PERIODS, "age of news × largest eigenvalue of KL", age.secs() * speed, 1.0);
+        let heard = self.asks(IN_PERIODS, "unheard part of a link's up time", unheard, SMALL);
         fresh && calm && heard
     }
 
@@ -537,7 +546,7 @@ mod tests {
     }
 
     /// Every 0.1 s through windows of 2.5 s, unheard for as long.
-    const IN_PERIODS: Exchange =
+    const EVERY_TENTH: Exchange =
         Exchange { age: Span::from_nanos(200_000_000), shortest_up: Span::from_nanos(2_500_000_000), unheard: 0.04 };
 
     #[test]
@@ -547,16 +556,17 @@ mod tests {
             let seen = Seen { exchange: Some(exchange), ..seen };
             watch(&agreement(0.1), &graphs, seen, Vec::new()).judge(&[(0.0, 1.0), (90.0, 1.0)], Tolerance::default())
         };
-        assert!(matches!(judged(IN_PERIODS), Judgement::Defect { .. }), "this fleet is idle");
+        assert!(matches!(judged(EVERY_TENTH), Judgement::Defect { .. }), "this fleet is idle");
         // A message every 5 s, of which none falls into a window; and windows that are only half heard.
-        let rare = judged(Exchange { age: s(10.0), unheard: 1.0, ..IN_PERIODS });
-        let late = judged(Exchange { unheard: 0.5, ..IN_PERIODS });
-        for (judged, word) in [(rare, "age of news [s] < 0.6250"), (late, "it is 0.5000 (0.2500 too much)")] {
+        let rare = judged(Exchange { age: s(10.0), unheard: 1.0, ..EVERY_TENTH });
+        let late = judged(Exchange { unheard: 0.5, ..EVERY_TENTH });
+        for (judged, word) in [(rare, "age of news [s] must be below 0.6250"), (late, "it is 0.5000 (0.2500 too much)")]
+        {
             assert!(matches!(judged, Judgement::NotCovered { .. }), "{judged}");
             assert!(judged.to_string().contains(word), "{judged}");
         }
         // Gains that move a fleet far between two messages.
-        let seen = Seen { exchange: Some(IN_PERIODS), ..seen };
+        let seen = Seen { exchange: Some(EVERY_TENTH), ..seen };
         assert!(watch(&agreement(1.6), &graphs, seen, Vec::new()).covered_by.is_some());
         assert_eq!(watch(&agreement(1.7), &graphs, seen, Vec::new()).covered_by, None);
     }
@@ -564,7 +574,7 @@ mod tests {
     #[test]
     fn what_messages_in_periods_cost_is_allowed_and_no_more() {
         let (graphs, seen) = row_of_three(2.5, 100.0);
-        let (seen, watched) = (Seen { exchange: Some(IN_PERIODS), ..seen }, agreement(0.1));
+        let (seen, watched) = (Seen { exchange: Some(EVERY_TENTH), ..seen }, agreement(0.1));
         let watch = watch(&watched, &graphs, seen, Vec::new());
         let tolerance = watch.tolerance(&watched, &graphs, 0.5);
         // σ = 0.3, h = 0.2: 6 % and the 4 % unheard; behind by 0.1 each, two neighbours at most, λ₂ = 1.

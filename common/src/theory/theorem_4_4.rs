@@ -126,11 +126,11 @@ impl Coordination {
         middle - (middle.powi(2) - self.speed() * lambda_1 * coupling).max(0.0).sqrt()
     }
 
-    /// The loss rate below which the theorem holds: λ_0/(2k_mλ_m) for type I, 1 for type II.
+    /// The loss rate below which the theorem holds: λ_0/(2k_mλ_m) for type I, zero if the coupling leaves none; 1 for type II.
     pub fn alpha_limit(&self, following: PathFollowing) -> f64 {
         match following {
             PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => {
-                self.lambda_0(lambda_1, rho_1, alpha_1) / (2.0 * self.speed())
+                (self.lambda_0(lambda_1, rho_1, alpha_1) / (2.0 * self.speed())).max(0.0)
             }
             PathFollowing::TypeII { .. } => 1.0,
         }

@@ -4,10 +4,11 @@ use common::mission::Mission;
 use common::mission::file::{Delayed, LawChoice};
 use common::theory::delay::{self, DelayGains};
 use common::theory::delay_rate;
+use common::theory::monitor::Watched;
 use common::time::Span;
 
 use super::Case;
-use super::premises::premises_of_late_news;
+use super::premises::{premises_of_late_news, too_rare};
 use crate::results::TheoryRow;
 
 pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
@@ -18,10 +19,11 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
     let verdict = delay::verdict(DelayGains::Averaged(law.gain), tau, v_l, in_mean);
     let bears_losses = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_));
     let broken = premises_of_late_news(mission, network, tau);
-    let holds = verdict.holds && broken.is_empty();
+    let rare = too_rare(mission, network, &Watched::Delayed);
+    let holds = verdict.holds && broken.is_empty() && rare.is_empty();
     let mut value = verdict.value.clone();
-    for premise in &broken {
-        value += &format!("; {}", premise.found);
+    for found in broken.iter().map(|premise| &premise.found).chain(&rare) {
+        value += &format!("; {found}");
     }
     // On a network that never changes the rate is known exactly.
     let rate = (holds && network.graphs.len() == 1).then(|| delay_rate::rate(&network.graph, law.gain, tau)).flatten();

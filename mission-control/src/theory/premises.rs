@@ -1,10 +1,11 @@
 //! What the statements of chapter 4 take for granted besides the switching signal, and what a mission has instead.
 
+use common::graph::Graph;
 use common::mission::Mission;
-use common::mission::file::{FollowingChoice, FollowingType, LawChoice};
+use common::mission::file::{Between, FollowingChoice, FollowingType, LawChoice};
 use common::theory::PathFollowing;
-use common::theory::monitor::{Premise, Watched};
-use common::time::Span;
+use common::theory::monitor::{self, Exchange, Premise, Seen, Tolerance, Watch, Watched};
+use common::time::{Span, Time};
 
 use super::network::Network;
 
@@ -49,6 +50,46 @@ pub(super) fn looked_for(mission: &Mission, network: &Network) -> Option<Looked>
         });
     }
     Some(Looked { watched, broken, told })
+}
+
+/// How messages will fill the times in which links are up, by the plan.
+pub(super) fn planned_exchange(mission: &Mission, network: &Network) -> Exchange {
+    let period = mission.control_period * mission.message_ticks;
+    let oldest = match (network.graphs.len() > 1, mission.validity) {
+        (false, _) => period,
+        (true, validity) => validity.map_or(mission.end - Time::ZERO, |validity| period.max(validity)),
+    };
+    Exchange {
+        age: age(mission, oldest),
+        shortest_up: network.shortest_up,
+        unheard: (period.secs() / network.shortest_up.secs().max(1e-9)).min(1.0),
+    }
+}
+
+/// The age of what is used, from that of what was heard: what is heard in a control period is used by the next one, and its output
+/// held for one more.
+pub(super) fn age(mission: &Mission, oldest: Span) -> Span {
+    oldest + mission.control_period * 2
+}
+
+/// What messages in periods may cost at most: how fast a neighbour seems to fall behind, and what rounding leaves.
+pub(super) fn tolerance(mission: &Mission, graphs: &[Graph], watch: &Watch, watched: &Watched) -> Tolerance {
+    let fastest = mission.speed.fastest();
+    let drift = if mission.between == Between::Hold { fastest } else { 0.0 };
+    let furthest = mission.vehicles.iter().map(|plan| plan.start.xi.abs()).fold(0.0, f64::max);
+    let tolerance = watch.tolerance(watched, graphs, drift);
+    let rounding = ROUNDING * (furthest + fastest * mission.end.secs());
+    Tolerance { added: tolerance.added + rounding, ..tolerance }
+}
+
+/// What rounding leaves of errors, as a part of the way that is flown.
+const ROUNDING: f64 = 1e-12;
+
+/// The conditions on messages in periods that the plan does not meet.
+pub(super) fn too_rare(mission: &Mission, network: &Network, watched: &Watched) -> Vec<String> {
+    let Some(seen) = Seen::of(&network.planned) else { return Vec::new() };
+    let seen = Seen { exchange: Some(planned_exchange(mission, network)), ..seen };
+    monitor::watch(watched, &network.graphs, seen, Vec::new()).too_rare()
 }
 
 /// What section 4.4 asks for besides connectedness in mean.

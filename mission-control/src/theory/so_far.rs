@@ -1,14 +1,14 @@
 //! The theorem monitor over a fleet under way: the switching signal up to now, and where the vehicles said they are.
 
 use common::mission::Mission;
-use common::theory::monitor::{self, Envelope, Exchange, Margin, Premise, Seen};
+use common::theory::monitor::{self, Envelope, Margin, Premise, Seen};
 use common::time::{Span, Time};
 use common::wire::fleet::FleetStatus;
 use serde::Serialize;
 
 use super::network::Network;
-use super::premises::looked_for;
-use super::watched::{age, drift, margins, network_words};
+use super::premises::{looked_for, planned_exchange, tolerance};
+use super::watched::{margins, network_words};
 
 /// Whoever was heard longer ago than this many message periods, and a second, has fallen silent.
 const SILENT_PERIODS: i64 = 5;
@@ -76,21 +76,11 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
         };
         return Some(said(&watch, flown.end, initial_error, error, None, verdict));
     };
-    let period = mission.control_period * mission.message_ticks;
-    let oldest = match (network.graphs.len() > 1, mission.validity) {
-        (false, _) => period,
-        (true, validity) => validity.map_or(flown.end - Time::ZERO, |validity| period.max(validity)),
-    };
-    // A delay that the law was told is not age.
-    let exchange = Exchange {
-        age: age(mission, oldest, Span::ZERO),
-        shortest_up: network.shortest_up,
-        unheard: (period.secs() / network.shortest_up.secs().max(1e-9)).min(1.0),
-    };
+    let exchange = planned_exchange(&flown, &network);
     let seen = Seen { exchange: Some(exchange), ..planned };
     let broken = looked.broken.iter().cloned().chain(missing).collect();
     let watch = monitor::watch(&looked.watched, &network.graphs, seen, broken);
-    let tolerance = watch.tolerance(&looked.watched, &network.graphs, drift(mission));
+    let tolerance = tolerance(mission, &network.graphs, &watch, &looked.watched);
     let t = flown.end.secs();
     // Between words, a vehicle is taken to go on at v_L: it strays by what coordination asks of it meanwhile.
     let mut errors = vec![(0.0, initial_error)];

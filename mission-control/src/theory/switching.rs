@@ -1,18 +1,19 @@
 //! Coordination over a switching network, (4.21).
 
 use common::mission::file::GainOnly;
+use common::theory::monitor::Watched;
 use common::theory::theorem_4_4::Coordination;
 use common::theory::{Gains, PathFollowing, theorem_4_5};
 use common::time::Time;
 
 pub(super) use super::premises::moves_as_told;
-use super::premises::{following, late_or_lost};
+use super::premises::{following, late_or_lost, too_rare};
 use super::{Case, Guarantee};
 use crate::results::TheoryRow;
 
 /// Theorem 4.4 for targets that move as told.
 pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
-    if !(case.network.immediate && moves_as_told(case.mission)) || case.network.cut_off {
+    if !(case.network.immediate && moves_as_told(case.mission)) || case.network.cut_off || !rare(case, law).is_empty() {
         return None;
     }
     let coordination = coordination(case, law)?;
@@ -41,9 +42,9 @@ pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
 /// Both theorems for targets with dynamics of their own (4.53): errors go into a ball that δ and other disturbances set.
 fn rows_of_type_1(case: &Case<'_>, law: &GainOnly, type_1: PathFollowing) -> Vec<TheoryRow> {
     let network = &case.network;
-    let met = network.immediate && !network.cut_off;
+    let met = network.immediate && !network.cut_off && rare(case, law).is_empty();
     let PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } = type_1 else { return Vec::new() };
-    let constants = format!("λ₁ = {lambda_1:.5} 1/s, ρ₁ = {rho_1:.5}, α₁ = {alpha_1:.2}{}", obstacles(case));
+    let constants = format!("λ₁ = {lambda_1:.5} 1/s, ρ₁ = {rho_1:.5}, α₁ = {alpha_1:.2}{}", obstacles(case, law));
     let four = coordination(case, law).map(|coordination| coordination.verdict(type_1));
     let four = match four {
         Some(verdict) => TheoryRow {
@@ -89,14 +90,24 @@ fn two_way(case: &Case<'_>) -> bool {
     case.network.graphs.iter().all(common::graph::Graph::is_undirected)
 }
 
+/// The conditions on messages in periods that the plan does not meet.
+fn rare(case: &Case<'_>, law: &GainOnly) -> Vec<String> {
+    let gains = vec![law.gain; case.mission.vehicles.len()];
+    let watched = Watched::Agreement(gains, PathFollowing::TypeII { lambda_1: f64::INFINITY });
+    too_rare(case.mission, &case.network, &watched)
+}
+
 /// What is in the way of both theorems.
-fn obstacles(case: &Case<'_>) -> String {
+fn obstacles(case: &Case<'_>, law: &GainOnly) -> String {
     let mut obstacles = String::new();
     if let Some(premise) = late_or_lost(case.mission, common::time::Span::ZERO) {
         obstacles += &format!("; messages: {}", premise.found);
     }
     if let Err(premise) = following(case.mission) {
         obstacles += &format!("; the constants of Assumption 4.1 are not known: {}", premise.found);
+    }
+    for rare in rare(case, law) {
+        obstacles += &format!("; {rare}");
     }
     if case.network.cut_off {
         obstacles += "; only the graphs of the first 20000 changes were looked at";
@@ -109,12 +120,12 @@ fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
     let lambda_m = coordination(case, law).map_or("unknown".to_string(), |c| format!("{:.5}", c.lambda_m));
     TheoryRow {
         name: "Theorem 4.4 (rate of the norm, erratum 4.4)".into(),
-        condition: "two-way links, α < 1, no delay, no loss, targets that move as told (type II)".into(),
+        condition: "two-way links, α < 1, no delay, no loss, short periods, targets that move as told (type II)".into(),
         value: format!(
             "α = {:.4}, k_m = {:.4} 1/s, λ_m = {lambda_m}{}",
             case.network.alpha(),
             law.gain,
-            obstacles(case)
+            obstacles(case, law)
         ),
         holds: Some(guarantee.is_some()),
         predicted: guarantee.map_or("–".into(), |g| format!("‖e‖ decays at ≥ {:.5} 1/s", g.rate)),
@@ -125,7 +136,8 @@ fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
 
 fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
     let Case { mission, network, .. } = case;
-    let met = network.immediate && moves_as_told(mission) && two_way(case) && !network.cut_off;
+    let met =
+        network.immediate && moves_as_told(mission) && two_way(case) && !network.cut_off && rare(case, law).is_empty();
     let mean = network.planned.connected_in_mean();
     let dwell = dwell(case);
     let proven = Gains::new(&vec![law.gain; mission.vehicles.len()])
@@ -135,12 +147,14 @@ fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
         .filter(|proven| proven.rate > 0.0);
     TheoryRow {
         name: "Theorem 4.5 (its printed rate is no bound; this one is proven, erratum 4.7)".into(),
-        condition: "two-way links, connected in mean, no delay, no loss, targets that move as told (type II)".into(),
+        condition:
+            "two-way links, connected in mean, no delay, no loss, short periods, targets that move as told (type II)"
+                .into(),
         value: format!(
             "{}{}, dwell time {dwell}{}",
             if two_way(case) { "" } else { "one-way links, which the thesis leaves to the literature; " },
             mean.map_or("never connected in mean".to_string(), |mean| format!("T = {mean}")),
-            obstacles(case)
+            obstacles(case, law)
         ),
         holds: Some(mean.is_some() && met),
         predicted: match proven {

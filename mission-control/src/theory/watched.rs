@@ -5,12 +5,11 @@
 
 use common::graph::Graph;
 use common::mission::Mission;
-use common::mission::file::Between;
-use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch};
+use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch, Watched};
 use common::time::Span;
 
 use super::network::Network;
-use super::premises::{Looked, looked_for};
+use super::premises::{Looked, age, looked_for, tolerance};
 use super::{Case, Guarantee, guarantee_of, law_rows};
 use crate::results::{Absence, Connectivity, Summary, TheoryRow};
 
@@ -28,7 +27,7 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
     };
     let broken = looked.broken.iter().cloned().chain(absent(absences)).collect();
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
-    let tolerance = tolerance(case, &watch, &looked);
+    let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
     let judged = watch.judge(&errors(summary, f64::INFINITY), tolerance);
     Some(TheoryRow {
         value: format!("{}; {}", network_words(&watch), margins(&watch)),
@@ -52,6 +51,8 @@ pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guara
 
 /// What theory promises a mission on every switching signal over these graphs with this α, T_0 and dwell time, `length` long.
 ///
+/// With it, what messages in periods may cost.
+///
 /// # Errors
 /// Why it promises no envelope.
 pub fn envelope_over(
@@ -59,20 +60,31 @@ pub fn envelope_over(
     graphs: &[Graph],
     (alpha, t_0, dwell): (f64, Span, Span),
     length: Span,
-) -> Result<Envelope, String> {
+) -> Result<(Envelope, Tolerance), String> {
     let network = Network::of(mission);
     let looked = looked_for(mission, &network).ok_or_else(|| {
         "Theorem 4.4 and Lemma 4.7, which bound errors for such signals, do not speak of this law".to_string()
     })?;
-    let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: None, exchange: None };
+    if looked.watched == Watched::Delayed {
+        return Err("Lemmas 4.4 and 4.5, which speak of this law, promise agreement without a rate".to_string());
+    }
+    // No link is up for a shorter time than the dwell time.
+    let period = mission.control_period * mission.message_ticks;
+    let exchange = Exchange {
+        age: age(mission, mission.validity.map_or(length, |validity| period.max(validity))),
+        shortest_up: dwell,
+        unheard: (period.secs() / dwell.secs().max(1e-9)).min(1.0),
+    };
+    let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: None, exchange: Some(exchange) };
     let watch = monitor::watch(&looked.watched, graphs, seen, looked.broken);
-    watch.envelope.ok_or_else(|| watch.judge(&[], Tolerance::default()).to_string())
+    let tolerance = tolerance(mission, graphs, &watch, &looked.watched);
+    let envelope = watch.envelope.ok_or_else(|| watch.judge(&[], Tolerance::default()).to_string())?;
+    Ok((envelope, tolerance))
 }
 
-/// What a law was told of the delay is not age; the control period is.
-pub(super) fn age(mission: &Mission, oldest: Span, told: Span) -> Span {
-    // What is heard in a control period is used by the next one, and its output held for one more.
-    Span::from_nanos((oldest.nanos() - told.nanos()).max(0)) + mission.control_period * 2
+/// A delay that the law was told is not age.
+fn not_told(oldest_s: f64, told: Span) -> Span {
+    Span::from_secs((oldest_s - told.secs()).max(0.0))
 }
 
 fn seen(mission: &Mission, measured: &Connectivity, looked: &Looked) -> Option<Seen> {
@@ -85,7 +97,7 @@ fn seen(mission: &Mission, measured: &Connectivity, looked: &Looked) -> Option<S
         mean: measured.t_s.map(Span::from_secs),
         exchange: Some(Exchange {
             // Where nothing was heard, nothing is old; the unheard part says it.
-            age: age(mission, measured.oldest_news_s.map_or(Span::ZERO, Span::from_secs), looked.told)
+            age: age(mission, not_told(measured.oldest_news_s.unwrap_or(0.0), looked.told))
                 .max(mission.control_period * mission.message_ticks),
             shortest_up: Span::from_secs(measured.shortest_up_s),
             unheard: measured.unheard,
@@ -96,15 +108,6 @@ fn seen(mission: &Mission, measured: &Connectivity, looked: &Looked) -> Option<S
 fn errors(summary: &Summary, until_s: f64) -> Vec<(f64, f64)> {
     let series = &summary.fleet.coordination.series;
     series.t_s.iter().copied().zip(series.norm.iter().copied()).filter(|(t, _)| *t <= until_s).collect()
-}
-
-/// How fast a neighbour seems to fall behind while nothing new is heard of it.
-pub(super) fn drift(mission: &Mission) -> f64 {
-    if mission.between == Between::Hold { mission.speed.fastest() } else { 0.0 }
-}
-
-fn tolerance(case: &Case<'_>, watch: &Watch, looked: &Looked) -> Tolerance {
-    watch.tolerance(&looked.watched, &case.network.graphs, drift(case.mission))
 }
 
 /// The premise that vehicles which were silent at times do not meet.
@@ -123,7 +126,8 @@ fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
     let first = summary.fleet.absences.first()?;
     let seen = seen(case.mission, summary.fleet.connectivity_before.as_ref()?, looked)?;
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, looked.broken.clone());
-    let judged = watch.judge(&errors(summary, first.from_s), tolerance(case, &watch, looked));
+    let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
+    let judged = watch.judge(&errors(summary, first.from_s), tolerance);
     Some(format!("; judged until {:.1} s alone: {judged}", first.from_s))
 }
 
