@@ -106,6 +106,9 @@ fn obstacles(case: &Case<'_>, law: &GainOnly) -> String {
     if let Err(premise) = following(case.mission) {
         obstacles += &format!("; the constants of Assumption 4.1 are not known: {}", premise.found);
     }
+    if !two_way(case) {
+        obstacles += "; one-way links, which the thesis leaves to the literature";
+    }
     for rare in rare(case, law) {
         obstacles += &format!("; {rare}");
     }
@@ -151,8 +154,7 @@ fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
             "two-way links, connected in mean, no delay, no loss, short periods, targets that move as told (type II)"
                 .into(),
         value: format!(
-            "{}{}, dwell time {dwell}{}",
-            if two_way(case) { "" } else { "one-way links, which the thesis leaves to the literature; " },
+            "{}, dwell time {dwell}{}",
             mean.map_or("never connected in mean".to_string(), |mean| format!("T = {mean}")),
             obstacles(case, law)
         ),

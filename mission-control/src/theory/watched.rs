@@ -214,3 +214,141 @@ pub(super) fn margins(watch: &Watch) -> String {
     });
     words.collect::<Vec<_>>().join("; ")
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use bus::recording::Recording;
+    use common::record::{Record, Row};
+
+    use super::*;
+    use crate::facts::facts;
+    use crate::results::summarise;
+    use crate::simulate::simulate;
+
+    const BRIEF_LOSSES: &str = include_str!("../../../missions/brief-losses.toml");
+    const HELIX: &str = include_str!("../../../missions/auv-helix.toml");
+    const ONE_LINK: &str = include_str!("../../../missions/thesis/ucm-one-link-at-a-time.toml");
+
+    fn changed(text: &str, changes: &[(&str, &str)]) -> Arc<Mission> {
+        let text = changes.iter().fold(text.to_string(), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replace(from, to)
+        });
+        Arc::new(Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
+    }
+
+    fn flown(mission: &Arc<Mission>) -> Recording {
+        let mut recording = Recording { complete: true, ..Recording::default() };
+        let keep = |row: Row| {
+            if let Row::Exact(record) = row {
+                recording.exact.push(record);
+            }
+        };
+        simulate(mission, keep, |_| true).expect("flies");
+        recording
+    }
+
+    fn judged(mission: &Mission, recording: &Recording) -> (TheoryRow, Option<Guarantee>) {
+        let summary = summarise(recording, &facts(mission));
+        let row = row(&Case::new(mission, Some(&summary))).expect("several vehicles");
+        (row, guarantee_of_flight(mission, &summary))
+    }
+
+    fn verdict(text: &str, changes: &[(&str, &str)]) -> String {
+        let mission = changed(text, changes);
+        let (row, _) = judged(&mission, &flown(&mission));
+        assert_eq!(row.holds, Some(row.measured.starts_with("covered")), "{row:?}");
+        row.measured
+    }
+
+    #[test]
+    fn what_is_covered_is_said_to_be_and_its_envelope_is_that_of_the_measured_network() {
+        let mission = changed(BRIEF_LOSSES, &[]);
+        let (row, guarantee) = judged(&mission, &flown(&mission));
+        assert!(row.measured.starts_with("covered by Theorem 4.4; the error reached"), "{row:?}");
+        assert!(guarantee.is_some_and(|g| (g.rate - 0.025).abs() < 1e-9), "{guarantee:?}");
+        let mission = changed(ONE_LINK, &[("duration_s = 400.0", "duration_s = 100.0")]);
+        let (row, guarantee) = judged(&mission, &flown(&mission));
+        assert!(row.measured.starts_with("covered by Theorem 4.5; the error reached"), "{row:?}");
+        assert!(guarantee.is_some_and(|g| g.rate > 0.004 && g.factor.is_some_and(|factor| factor > 1.0)));
+    }
+
+    #[test]
+    fn the_premise_that_fails_is_named() {
+        let short = ("duration_s = 800.0", "duration_s = 60.0");
+        let delay = (
+            "delay = { constant = { delay_s = 5.0 } }",
+            "delay = { constant = { delay_s = 1.0 } }\nloss = { bernoulli = { probability = 0.5 } }",
+        );
+        let type_1 = ("kind = \"II\"", "kind = \"I\"");
+        for (text, changes, words) in [
+            (HELIX, vec![short, delay], "they take 1.000 s, 0.5000 of them are lost"),
+            (HELIX, vec![short, type_1], "auv1 has dynamics of its own (type I, (4.53))"),
+            (BRIEF_LOSSES, vec![type_1], "Theorem 4.4 (type I): ρ₁/(α₁λ₁) must be below 0.1111"),
+            (
+                BRIEF_LOSSES,
+                vec![("links = [[\"auv1\", \"auv2\"],", "one_way = [[\"auv1\", \"auv2\"]]\nlinks = [")],
+                "one-way links occur",
+            ),
+            (
+                BRIEF_LOSSES,
+                vec![("message_period_s = 0.1", "message_period_s = 5.0"), ("validity_s = 0.3", "validity_s = 10.0")],
+                "unheard part of a link's up time must be below 0.2500, and it is 1.0000",
+            ),
+            (
+                BRIEF_LOSSES,
+                vec![
+                    ("message_period_s = 0.1", "message_period_s = 2.5"),
+                    ("validity_s = 0.3", "validity_s = 5.0"),
+                    ("up_from_s = 7.5, up_for_s = 2.5", "up_from_s = 0.2, up_for_s = 2.0"),
+                ],
+                "age of news [s] must be below 0.5000",
+            ),
+        ] {
+            let verdict = verdict(text, &changes);
+            assert!(verdict.starts_with("not covered: ") && verdict.contains(words), "{words}: {verdict}");
+        }
+    }
+
+    #[test]
+    fn a_silent_vehicle_ends_what_is_covered() {
+        let mission = changed(BRIEF_LOSSES, &[]);
+        let mut recording = flown(&mission);
+        let gone =
+            |row: &Record| matches!(row, Record::State(row) if &*row.vehicle == "auv3" && row.t_ns > 57_000_000_000);
+        recording.exact.retain(|row| !gone(row));
+        let (row, guarantee) = judged(&mission, &recording);
+        assert!(row.measured.contains("auv3 is silent from 57.0 s to 120.0 s"), "{}", row.measured);
+        assert!(row.measured.contains("judged until 57.0 s alone: covered by Theorem 4.4"), "{}", row.measured);
+        assert_eq!((row.holds, guarantee), (Some(false), None));
+    }
+
+    #[test]
+    fn every_mission_with_several_vehicles_has_a_verdict() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../missions");
+        let mut count = 0;
+        for folder in ["", "thesis", "talk"] {
+            for entry in std::fs::read_dir(root.join(folder)).expect("lists") {
+                let path = entry.expect("an entry").path();
+                let text = std::fs::read_to_string(&path).unwrap_or_default();
+                let Ok(mission) = Mission::parse("m.toml", &text) else { continue };
+                if mission.vehicles.len() > 1 {
+                    let (row, _) = judged(&mission, &Recording::default());
+                    assert!(row.measured.starts_with("not covered: "), "{}: {row:?}", path.display());
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 25, "{count}");
+    }
+
+    #[test]
+    fn laws_of_other_chapters_are_spoken_of_by_their_own_propositions() {
+        const SOLUTION: &str = include_str!("../../../missions/thesis/solution-1.toml");
+        let verdict = verdict(SOLUTION, &[]);
+        assert_eq!(verdict, "covered by Proposition 3.4 (solution I), without an envelope");
+    }
+}

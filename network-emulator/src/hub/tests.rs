@@ -1,6 +1,7 @@
 //! The hub as mission-control and the vehicles see it.
 
 use common::mission::digest;
+use common::wire::state::CoordinationState;
 use common::wire::vehicle::FlightPlan;
 
 use super::*;
@@ -152,4 +153,20 @@ fn a_speed_that_is_no_number_is_refused() {
     for speed in [f64::NAN, f64::INFINITY] {
         assert!(refusal(&ask(&mut hub, Time::from_secs(1.0), ToFleet::Speed { speed })).is_some());
     }
+}
+
+#[test]
+fn the_status_tells_where_vehicles_said_they_are() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let made = Time::from_secs(1.0);
+    let state = CoordinationState { mission: digest(HELIX), sender: 1, seq: 10, made, xi: 71.5, scalar: None };
+    hub.handle(made, Some(HubInput::State(1, state.encode().into())));
+    let answers = ask(&mut hub, Time::from_secs(1.2), ToFleet::Status);
+    let status = answers.into_iter().find_map(|output| match output {
+        HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some(status),
+        _ => None,
+    });
+    let said: Vec<_> = status.expect("an answer").vehicles.into_iter().map(|vehicle| vehicle.said).collect();
+    assert_eq!(said, [None, Some((made, 71.5)), None]);
 }
