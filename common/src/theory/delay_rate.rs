@@ -36,7 +36,9 @@ fn lambert_w_0(ln_z: Complex<f64>) -> Complex<f64> {
     }
     let z = ln_z.exp();
     let branch = (Complex::from(2.0) * (z * std::f64::consts::E + one)).sqrt();
-    let mut w = if (z + (-1.0f64).exp()).norm() < 0.3 { branch - one - branch * branch / 3.0 } else { (one + z).ln() };
+    // Around the branch point by its series; also where 1 + z is nearly a positive real number and W is not, for from a real
+    // number the iteration stays real.
+    let mut w = if (z + (-1.0f64).exp()).norm() < 0.7 { branch - one - branch * branch / 3.0 } else { (one + z).ln() };
     for _ in 0..60 {
         let exp = w.exp();
         let excess = w * exp - z;
@@ -95,6 +97,14 @@ mod tests {
         assert!((w(Complex::from(std::f64::consts::E)) - 1.0).norm() < 1e-12);
         assert!((w(Complex::from(1.0)) - 0.567_143_290_409_783_8).norm() < 1e-12);
         assert!((w(Complex::from(-(-1.0f64).exp() * (1.0 - 1e-12))) + 1.0).norm() < 1e-5);
+        // Between −1 and −1/e it is no real number, though 1 + z is a positive one.
+        for z in [-0.68, -0.738, -0.9, -1.0, -1.06] {
+            let w = w(Complex::from(z));
+            assert!(
+                (w * w.exp() - z).norm() < 1e-12 && w.im.abs() > 1.0 && w.im.abs() < std::f64::consts::PI,
+                "{z}: {w}"
+            );
+        }
         let quarter = w(Complex::from(-std::f64::consts::FRAC_PI_2));
         assert!((quarter.re.abs() < 1e-12) && (quarter.im.abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         assert!((lambert_w_0(Complex::from(800.0)) + lambert_w_0(Complex::from(800.0)).ln() - 800.0).norm() < 1e-9);
