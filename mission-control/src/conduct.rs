@@ -385,8 +385,13 @@ mod tests {
     }
 
     fn status(phase: Phase, mission: &str, vehicles: Phase) -> FleetStatus {
-        let vehicle =
-            |id: &str| VehicleStatus { id: id.into(), connected: true, phase: vehicles, reason: String::new() };
+        let vehicle = |id: &str| VehicleStatus {
+            id: id.into(),
+            connected: true,
+            phase: vehicles,
+            reason: String::new(),
+            said: None,
+        };
         FleetStatus {
             phase,
             mission: mission.into(),

@@ -44,6 +44,7 @@ pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
         message_bytes: (0..mission.vehicles.len()).map(|i| mission.message_bytes(i) as u64).max().unwrap_or(0),
         duration_s: mission.end.secs(),
         control_period_s: mission.control_period.secs(),
+        validity_s: mission.validity.map(|validity| validity.secs()),
         link_period_s: file.as_ref().and_then(|file| match &file.network.switching {
             SwitchingChoice::Periodic(periodic) => Some(periodic.period_s),
             SwitchingChoice::Intervals(intervals) => intervals.period_s,

@@ -13,7 +13,7 @@ use common::time::Time;
 use serde::{Deserialize, Serialize};
 
 use crate::facts::{facts_at, speed_in_force};
-use crate::results::{Account, Summary, write_run_folder};
+use crate::results::{Account, Summary, Theory, write_run_folder};
 use crate::theory;
 
 /// Names of the files in a run folder.
@@ -166,7 +166,11 @@ pub fn report(folder: &Path, mut notes: Vec<String>) -> Result<Summary, String> 
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
     let reproduce = reproduce(folder, &mission, &recording);
     let account = Account { notes, reproduce };
-    write_run_folder(folder, &recording, &facts, |summary| theory::rows(&mission, Some(summary)), &account)
+    let theory = |summary: &Summary| Theory {
+        rows: theory::rows(&mission, Some(summary)),
+        envelope: theory::guarantee_of_flight(&mission, summary).map(|guarantee| (guarantee.rate, guarantee.factor)),
+    };
+    write_run_folder(folder, &recording, &facts, theory, &account)
         .map_err(|error| format!("cannot write the report: {error}"))
 }
 

@@ -62,8 +62,8 @@ pub fn describe(status: &FleetStatus) -> String {
     );
     let [sent, delivered, dropped, in_flight] = status.messages;
     let _ = writeln!(text, "messages: {sent} sent = {delivered} delivered + {dropped} dropped + {in_flight} in flight");
-    if let Some(words) = mission.as_ref().and_then(|mission| crate::theory::so_far(mission, status.now)) {
-        let _ = writeln!(text, "{words}");
+    if let Some(so_far) = mission.as_ref().and_then(|mission| crate::theory::so_far(mission, status)) {
+        let _ = writeln!(text, "{so_far}");
     }
     for vehicle in &status.vehicles {
         let line = if vehicle.connected { "connected" } else { "not connected" };

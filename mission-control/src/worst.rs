@@ -6,16 +6,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::graph::adversary::{Allowance, Signal, Signals};
 use common::mission::Mission;
-use common::mission::file::{
-    FollowingChoice, FollowingType, IntervalSwitching, LawChoice, MissionFile, SwitchingChoice, UpInterval,
-};
+use common::mission::file::{IntervalSwitching, MissionFile, SwitchingChoice, UpInterval};
 use common::random::Stream;
 use common::record::{Record, Row};
-use common::theory::theorem_4_4::Coordination;
+use common::theory::monitor::Envelope;
 use common::time::{Span, Time};
 use serde::Serialize;
 
 use crate::simulate::simulate;
+use crate::theory;
 
 /// What counts as hurt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -25,6 +24,16 @@ pub enum Hurt {
     End,
     /// Its mean over the mission
     Mean,
+}
+
+impl Hurt {
+    /// As on the command line.
+    fn as_str(self) -> &'static str {
+        match self {
+            Hurt::End => "end",
+            Hurt::Mean => "mean",
+        }
+    }
 }
 
 /// What is looked for, and how long.
@@ -53,10 +62,16 @@ pub struct Worst {
     pub worst: f64,
     /// Under the worst signal found, at the end: the decay that is left \[1/s\].
     pub rate: f64,
-    /// What Theorem 4.4 allows at the end, if it speaks about the mission.
+    /// What theory allows of what counts as hurt, if it speaks about the mission.
     pub bound: Option<f64>,
+    /// Whether the worst found is within it, with what messages in periods and rounding may add; else there is a defect.
+    pub within: Option<bool>,
+    /// The statement that does.
+    pub statement: Option<&'static str>,
     /// The rate that it guarantees \[1/s\].
     pub guaranteed_rate: Option<f64>,
+    /// Why there is no bound.
+    pub no_bound: Option<String>,
     /// How many flights it took.
     pub flights: usize,
     /// Where the mission with that signal is.
@@ -68,6 +83,8 @@ struct Rewriter {
     file: MissionFile,
     /// Directed links by number, as pairs of ids.
     links: Vec<[String; 2]>,
+    /// What is said about it besides.
+    more: String,
 }
 
 impl Rewriter {
@@ -79,6 +96,8 @@ impl Rewriter {
             links: interval.links.map(pairs),
         });
         let mut file = self.file.clone();
+        file.name = format!("{}-worst", file.name);
+        file.about = format!("{}{}", file.about, self.more);
         file.network.switching = SwitchingChoice::Intervals(IntervalSwitching { up: up.collect(), period_s: None });
         toml::to_string(&file).map_err(|error| format!("cannot write the mission: {error}"))
     }
@@ -126,7 +145,8 @@ fn fly(text: &str) -> Result<Errors, String> {
     Ok(Errors { initial, end, mean: norms.iter().sum::<f64>() / instants as f64 })
 }
 
-/// Searches, on two threads or more, and saves the mission with the worst signal found as `out`.
+/// Searches, on four threads, and saves the mission with the worst signal found as `out`, with what it was found by. `source` is
+/// how the mission is called on the command line.
 ///
 /// The search is a function of the mission, the seed and the number of flights, not of the machine.
 ///
@@ -135,6 +155,7 @@ fn fly(text: &str) -> Result<Errors, String> {
 pub fn worst(
     mission: &Mission,
     quest: &Quest,
+    source: &str,
     out: &std::path::Path,
     progress: impl Fn(usize) + Sync,
 ) -> Result<Worst, String> {
@@ -143,7 +164,11 @@ pub fn worst(
     let links = mission.links.iter().map(|link| [id(link.from), id(link.to)]).collect();
     let arcs: Vec<(usize, usize)> = mission.links.iter().map(|link| (link.to, link.from)).collect();
     let signals = Signals::new(mission.vehicles.len(), &arcs, quest.allowance, mission.end)?;
-    let rewriter = Rewriter { file, links };
+    let Allowance { alpha, t_0, dwell } = quest.allowance;
+    let allowed = format!("α = {alpha}, T₀ = {t_0} and a dwell time of {dwell}");
+    let space = if file.about.is_empty() { "" } else { " " };
+    let more = format!("{space}Under the worst switching signal found with {allowed}, seed {}.", quest.seed);
+    let rewriter = Rewriter { file, links, more };
     let written = fly(&mission.text)?;
 
     let chains = CHAINS.min(quest.flights.max(1));
@@ -158,7 +183,8 @@ pub fn worst(
                     Ok(errors.hurt(quest.hurt))
                 };
                 let stream = Stream::new(quest.seed, &format!("worst/{number}"));
-                climb(signals, number, chains, quest.flights / chains, stream, hurts)
+                let more = usize::from(number < quest.flights % chains);
+                climb(signals, number, chains, quest.flights / chains + more, stream, hurts)
             })
         };
         let threads: Vec<_> = (0..chains).map(chain).collect();
@@ -174,17 +200,38 @@ pub fn worst(
     let (worst, signal) = best.ok_or("no flight was allowed")?;
     let text = rewriter.text(&signals, &signal)?;
     let Errors { initial, end, .. } = fly(&text)?;
-    std::fs::write(out, &text).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
-    let promise = promise(mission, &signals, &quest.allowance);
+    let flights = flown.into_inner();
+    let head = format!(
+        "# The worst switching signal found with {allowed}:\n# coordination error ({}) {worst:.4e}, at the start {initial:.4e}, \
+         in {flights} flights.\n# mission-control worst {source} --alpha {alpha} --t0 {} --dwell {} --hurt {} --flights {} --seed {}\n",
+        quest.hurt.as_str(),
+        t_0.secs(),
+        dwell.secs(),
+        quest.hurt.as_str(),
+        quest.flights,
+        quest.seed
+    );
+    std::fs::write(out, head + &text).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+    let length = mission.end - Time::ZERO;
+    let promise = theory::envelope_over(mission, signals.graphs(), (alpha, t_0, dwell), length);
+    let bound = promise.as_ref().ok().map(|(envelope, _)| initial * most(envelope, quest.hurt, length.secs()));
+    let within = promise.as_ref().ok().map(|(envelope, tolerance)| {
+        let slower = Envelope { rate: envelope.rate * (1.0 - tolerance.slower), ..*envelope };
+        let late = (slower.rate * tolerance.late).exp();
+        worst <= initial * late * most(&slower, quest.hurt, length.secs()) + tolerance.added
+    });
     Ok(Worst {
         initial,
         hurt: quest.hurt,
         as_written: written.hurt(quest.hurt),
         worst,
         rate: (initial / end).ln() / mission.end.secs(),
-        bound: promise.map(|(rate, factor)| factor * (-rate * mission.end.secs()).exp() * initial),
-        guaranteed_rate: promise.map(|(rate, _)| rate),
-        flights: flown.into_inner(),
+        bound,
+        within,
+        statement: promise.as_ref().ok().map(|(envelope, _)| envelope.statement),
+        guaranteed_rate: promise.as_ref().ok().map(|(envelope, _)| envelope.rate),
+        no_bound: promise.err(),
+        flights,
         saved: out.to_path_buf(),
     })
 }
@@ -215,11 +262,15 @@ fn climb(
         }
     }
     let mut best = best.ok_or("the search has no start")?;
-    for _ in 0..left {
+    // A change that changes nothing is no flight; where almost nothing can change, the search ends early.
+    let mut idle = 0;
+    while left > 0 && idle < MOST_IDLE {
         let other = signals.changed(&best.1, &mut stream);
         if other == best.1 {
+            idle += 1;
             continue;
         }
+        (idle, left) = (0, left - 1);
         let value = hurts(&other)?;
         if value >= best.0 {
             best = (value, other);
@@ -228,21 +279,18 @@ fn climb(
     Ok(best)
 }
 
-/// Rate and factor that Theorem 4.4 gives for every signal that is admitted: for (4.21), targets that move as told, and
-/// messages that are neither late nor lost.
-fn promise(mission: &Mission, signals: &Signals, allowance: &Allowance) -> Option<(f64, f64)> {
-    let LawChoice::Switching(law) = &mission.law_choice else { return None };
-    let at_once = mission.every_message_takes(Span::ZERO) && mission.loses_by_switching_only();
-    let as_told = mission
-        .vehicles
-        .iter()
-        .all(|v| matches!(&v.following, FollowingChoice::Theorem47(gains) if gains.kind == FollowingType::II));
-    if !(at_once && as_told) {
-        return None;
+/// So many changes in a row may change nothing.
+const MOST_IDLE: usize = 1000;
+
+/// What an envelope allows of an error of one: at the end, or on average.
+fn most(envelope: &Envelope, hurt: Hurt, length: f64) -> f64 {
+    match hurt {
+        Hurt::End => envelope.at(length),
+        Hurt::Mean if envelope.rate > 0.0 => {
+            envelope.factor * -(-envelope.rate * length).exp_m1() / (envelope.rate * length)
+        }
+        Hurt::Mean => envelope.factor,
     }
-    let gains = vec![law.gain; mission.vehicles.len()];
-    let coordination = Coordination::new(signals.graphs(), &gains, allowance.alpha)?;
-    Some((coordination.rate_of_agreement(), coordination.overshoot(allowance.t_0)))
 }
 
 /// T_0 and the dwell time of a quest from seconds.
@@ -270,7 +318,7 @@ mod tests {
         let quest = Quest { allowance: allowance(0.75, 15.0, 2.5), hurt: Hurt::End, flights: 40, seed: 3 };
         let search = |name: &str| {
             let out = folder.path().join(name);
-            let found = worst(&brief, &quest, &out, |_| {}).expect("found");
+            let found = worst(&brief, &quest, "brief.toml", &out, |_| {}).expect("found");
             (found, std::fs::read_to_string(out).expect("saved"))
         };
         let (found, text) = search("one.toml");
@@ -279,7 +327,12 @@ mod tests {
         assert!(found.worst > 1.1 * found.as_written, "{found:?}");
         assert!(found.bound.is_some_and(|bound| found.worst < bound), "{found:?}");
 
+        assert_eq!(found.flights, 40, "all that were allowed");
+        assert!(text.starts_with("# The worst switching signal found with α = 0.75"), "{text}");
+        assert!(text.contains("worst brief.toml --alpha 0.75 --t0 15 --dwell 2.5 --hurt end --flights 40 --seed 3\n"));
+
         let saved = mission(&text);
+        assert!(saved.name == "brief-losses-worst" && saved.about.ends_with("seed 3."), "{}", saved.about);
         let arcs: Vec<(usize, usize)> = saved.links.iter().map(|link| (link.to, link.from)).collect();
         let planned = Connectivity::planned(saved.switching.clone(), saved.vehicles.len(), &arcs, saved.end);
         assert!(planned.t_0(0.75).secs() <= 15.0 + 1e-6, "{}", planned.t_0(0.75));
@@ -290,7 +343,32 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let late = BRIEF_LOSSES.replace("[network]\n", "[network]\ndelay = { constant = { delay_s = 1.0 } }\n");
         let quest = Quest { allowance: allowance(0.5, 5.0, 2.5), hurt: Hurt::Mean, flights: 3, seed: 1 };
-        let found = worst(&mission(&late), &quest, &folder.path().join("late.toml"), |_| {}).expect("found");
+        let found =
+            worst(&mission(&late), &quest, "late.toml", &folder.path().join("late.toml"), |_| {}).expect("found");
         assert_eq!((found.bound, found.guaranteed_rate), (None, None));
+        assert!(found.no_bound.is_some_and(|reason| reason.contains("they take 1.000 s")));
+    }
+
+    #[test]
+    fn the_law_with_a_state_of_its_own_and_means_are_bounded_too() {
+        const EXAMPLE: &str = include_str!("../../missions/thesis/eq-4-62-example-4-1.toml");
+        let folder = tempfile::tempdir().expect("a folder");
+        let duration = "duration_s = ";
+        let at = EXAMPLE.find(duration).expect("a duration");
+        let end = at + EXAMPLE[at..].find('\n').expect("a line");
+        let short = format!("{}{duration}40.0{}", &EXAMPLE[..at], &EXAMPLE[end..]);
+        let quest = Quest { allowance: allowance(0.5, 5.0, 2.5), hurt: Hurt::Mean, flights: 6, seed: 1 };
+        let found = worst(&mission(&short), &quest, "m.toml", &folder.path().join("m.toml"), |_| {}).expect("found");
+        assert_eq!(found.statement, Some("Lemma 4.7"));
+        assert!(found.bound.is_some_and(|bound| bound > found.worst) && found.within == Some(true), "{found:?}");
+    }
+
+    #[test]
+    fn the_mean_of_an_envelope_is_that_of_its_values() {
+        let envelope = super::Envelope { statement: "", factor: 2.0, rate: 0.1 };
+        let values = (0..10_000).map(|i| envelope.at(30.0 * (f64::from(i) + 0.5) / 1e4));
+        let mean = values.sum::<f64>() / 1e4;
+        assert!((super::most(&envelope, Hurt::Mean, 30.0) - mean).abs() < 1e-6);
+        assert_eq!(super::most(&super::Envelope { rate: 0.0, ..envelope }, Hurt::Mean, 30.0), 2.0);
     }
 }

@@ -32,6 +32,7 @@ use crate::path::Path;
 use crate::talk::belief::Model;
 use crate::talk::speaker::acknowledgements;
 use crate::talk::trigger::Trigger;
+use crate::theory::{PathFollowing, Underactuated};
 use crate::time::{Span, Time};
 use crate::vehicle::environment::{Disturbances, Environment};
 use crate::wire::state::{Acknowledgement, CoordinationState, Word};
@@ -187,6 +188,33 @@ impl Mission {
             }
             _ => None,
         }
+    }
+
+    /// The constants of Assumption 4.1 that a vehicle has with Theorem 4.7 and (4.53), which do for type II too; `None` under other
+    /// path-following laws. |p'| and |p''| are the largest at 201 points of the path that is to be flown.
+    pub fn path_following_of_type_1(&self, vehicle: usize) -> Option<PathFollowing> {
+        const STEPS: u32 = 200;
+        let plan = &self.vehicles[vehicle];
+        let (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(law)) =
+            (&plan.model, &plan.following)
+        else {
+            return None;
+        };
+        let auv = build::auv(model).ok()?;
+        let parameters = auv.parameters();
+        let way = self.nominal_factor() * self.speed.distance(self.end);
+        let points = (0..=STEPS).map(|step| plan.path.at(plan.start.xi + way * f64::from(step) / f64::from(STEPS)));
+        let (stretch, bend) =
+            points.fold((0.0f64, 0.0f64), |(d1, d2), point| (d1.max(point.d1.norm()), d2.max(point.d2.norm())));
+        let underactuated = Underactuated {
+            mass: (parameters.mass.min(), parameters.mass.max()),
+            inertia: (parameters.inertia.min(), parameters.inertia.max()),
+            gains: [law.k_e, law.k_phi, law.k_z, law.k_eta],
+            fastest: self.speed.fastest(),
+            stretch,
+            bend,
+        };
+        underactuated.type_1()
     }
 
     /// The rate at which α_2 lets the fleet travel in the end under (4.59), where it is fed back and does not vanish

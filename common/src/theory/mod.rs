@@ -77,6 +77,80 @@ pub enum PathFollowing {
     },
 }
 
+impl PathFollowing {
+    /// ρ_v and ρ_d of section 4.1.1: the gains from sup|v~_r| and sup|d_i| to |ζ_i|, √(ρ_1/(λ_1α_1)) and √(ρ_2/(λ_1α_1)) (the
+    /// second is printed without its root, erratum 4.5). `None` for type II, whose constants are not looked at.
+    #[doc(alias = "ρ_v")]
+    #[doc(alias = "ρ_d")]
+    pub fn iss_gains(&self, rho_2: f64) -> Option<(f64, f64)> {
+        let PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } = *self else { return None };
+        let gain = |rho: f64| (rho / (lambda_1 * alpha_1)).sqrt();
+        Some((gain(rho_1), gain(rho_2)))
+    }
+}
+
+/// What Theorem 4.7 with (4.53) needs to be known of a vehicle and its path: W_4 then has the constants of Assumption 4.1.
+///
+/// From W_4 = ½|e|² + ½φ'M²φ + ½z_2'Jz_2 + ½η² and
+/// W_4' = −k_e e'M⁻¹e − k_φ φ'Mφ − k_z|z_2|² − k_ηη² + e'δ + α_2v~_r, α_2 = −e'q + (Mφ)'h_1, |h_1| ≤ b := v_n m|p''| + k_e|p'|,
+/// with m the largest mass and j the largest inertia: for λ_1 below 2·min(k_e/m, k_φ/m, k_z/j, k_η) what is left of the two first
+/// terms bears v~_r by Young's inequality,
+///
+/// ```text
+/// ρ_1 = (m/4)(|p'|²/(k_e(1 − λ_1m/(2k_e))) + b²/(k_φ(1 − λ_1m/(2k_φ)))),    α_1 = ½ min(1, least m², least j)
+/// ```
+///
+/// and as little as one likes of the first bears δ. λ_1 is chosen to make ρ_1/(α_1λ_1) small.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Underactuated {
+    /// Smallest and largest entry of M \[t\].
+    pub mass: (f64, f64),
+    /// Smallest and largest entry of J \[t m²\].
+    pub inertia: (f64, f64),
+    /// k_e, k_φ, k_z, k_η.
+    pub gains: [f64; 4],
+    /// The largest |v_n| \[1/s\].
+    pub fastest: f64,
+    /// The largest |p'| \[m\].
+    pub stretch: f64,
+    /// The largest |p''| \[m\].
+    pub bend: f64,
+}
+
+impl Underactuated {
+    /// The constants of Assumption 4.1 for type I; `None` if a gain, mass or inertia is not positive.
+    pub fn type_1(&self) -> Option<PathFollowing> {
+        const STEPS: u32 = 200;
+        let [k_e, k_phi, k_z, k_eta] = self.gains;
+        let (m, j) = (self.mass.1, self.inertia.1);
+        let positive = [k_e, k_phi, k_z, k_eta, self.mass.0, m, self.inertia.0, j];
+        if !positive.iter().all(|value| *value > 0.0 && value.is_finite()) {
+            return None;
+        }
+        let alpha_1 = 0.5 * self.mass.0.powi(2).min(self.inertia.0).min(1.0);
+        let border = 2.0 * (k_e / m).min(k_phi / m).min(k_z / j).min(k_eta);
+        let b = self.fastest.abs() * m * self.bend + k_e * self.stretch;
+        let rho_1 = |lambda_1: f64| {
+            let left = |k: f64| k * (1.0 - lambda_1 * m / (2.0 * k));
+            0.25 * m * (self.stretch.powi(2) / left(k_e) + b * b / left(k_phi))
+        };
+        (1..STEPS)
+            .map(|step| border * f64::from(step) / f64::from(STEPS))
+            .map(|lambda_1| PathFollowing::TypeI { lambda_1, rho_1: rho_1(lambda_1), alpha_1 })
+            .min_by(|a, b| a.coupling().total_cmp(&b.coupling()))
+    }
+}
+
+impl PathFollowing {
+    /// ρ_1/(α_1λ_1): how much coordination excites path following; zero for type II, where it does not come back.
+    pub fn coupling(&self) -> f64 {
+        match *self {
+            PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => rho_1 / (alpha_1 * lambda_1),
+            PathFollowing::TypeII { .. } => 0.0,
+        }
+    }
+}
+
 /// What the theorems need of the gains: n vehicles, each with a gain between k_m and k_M.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
@@ -101,6 +175,38 @@ impl Gains {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+
+    use super::{PathFollowing, Underactuated};
+
+    #[test]
+    fn erratum_4_5_both_gains_of_section_4_1_1_have_a_root() {
+        let following = PathFollowing::TypeI { lambda_1: 2.0, rho_1: 8.0, alpha_1: 1.0 };
+        assert_eq!(following.iss_gains(18.0), Some((2.0, 3.0)));
+        assert_eq!(PathFollowing::TypeII { lambda_1: 2.0 }.iss_gains(18.0), None);
+    }
+
+    #[test]
+    fn the_constants_of_theorem_4_7_bear_what_young_says() {
+        let vehicle = Underactuated {
+            mass: (4.7, 7.6),
+            inertia: (7.5, 7.7),
+            gains: [0.5, 1.0, 4.0, 1.0],
+            fastest: 0.5,
+            stretch: 0.31,
+            bend: 0.005,
+        };
+        let Some(PathFollowing::TypeI { lambda_1, rho_1, alpha_1 }) = vehicle.type_1() else {
+            panic!("positive gains")
+        };
+        assert!(alpha_1 == 0.5 && lambda_1 < 2.0 * 0.5 / 7.6 && rho_1 > 0.0);
+        // W_4' + λ_1W_4 − ρ_1v² with the worst masses is negative wherever one looks (z_2 = η = δ = 0).
+        let (m, b) = (7.6, 0.5 * 7.6 * 0.005 + 0.5 * 0.31);
+        for (e, y, v) in [(1.0, 0.0, 0.02), (1.0, 2.0, 0.1), (0.2, 3.0, 0.6), (5.0, 0.3, 0.4), (1.0, 1.0, 1.0)] {
+            let decay = -(0.5 * e * e + y * y) / m + 0.31 * e * v + b * y * v;
+            assert!(decay + lambda_1 * 0.5 * (e * e + y * y) - rho_1 * v * v <= 1e-12, "{e} {y} {v}");
+        }
+        assert!(Underactuated { gains: [0.5, 0.0, 4.0, 1.0], ..vehicle }.type_1().is_none());
+    }
 
     #[test]
     fn every_path_in_the_index_exists() {

@@ -9,6 +9,77 @@ use crate::graph::Graph;
 use crate::graph::spectrum::{lambda_2_weighted, lambda_m};
 use crate::time::Span;
 
+/// Lemma 4.3: two systems that drive each other, the second with brief instabilities.
+///
+/// ```text
+/// α_i|z_i|² ≤ V_i,   V_1' ≤ −λ_1V_1 + ρ_1|z_2|² + u_1²,   V_2' ≤ −λ_2(t)V_2 + ρ_2|z_1|² + u_2²
+/// ```
+///
+/// with λ_2(t) = λ_2, or −λ~_2 for the part α of the time. With r_1 = ρ_1/α_2, r_2 = ρ_2/α_1 and the left eigenvector
+/// (1, w) of [−λ_1, r_1; r_2, −λ_2] to its larger eigenvalue −λ_0, V = V_1 + wV_2 obeys V' ≤ −λ_0V while λ_2(t) = λ_2, and
+/// V' ≤ (−λ_0 + λ_2 + λ~_2)V else; hence V(t) ≤ c e^{−λt}V(0) where nothing else drives them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interconnection {
+    /// λ_1 \[1/s\], positive.
+    pub lambda_1: f64,
+    /// λ_2 \[1/s\], positive.
+    pub lambda_2: f64,
+    /// λ~_2: growth during an instability \[1/s\], not negative.
+    pub growth_2: f64,
+    /// ρ_1/α_2: how much the second drives the first, not negative.
+    pub drive_1: f64,
+    /// ρ_2/α_1: how much the first drives the second, not negative; zero is the cascade.
+    pub drive_2: f64,
+}
+
+impl Interconnection {
+    /// λ_0 (4.18) \[1/s\].
+    #[doc(alias = "λ_0")]
+    pub fn lambda_0(&self) -> f64 {
+        let middle = 0.5 * (self.lambda_1 + self.lambda_2);
+        let apart = 0.5 * (self.lambda_1 - self.lambda_2);
+        middle - (apart * apart + self.drive_1 * self.drive_2).sqrt()
+    }
+
+    /// (4.19) and α < λ_0/(λ_2 + λ~_2).
+    pub fn holds(&self, alpha: f64) -> bool {
+        let weakly = self.drive_1 * self.drive_2 < self.lambda_1 * self.lambda_2;
+        weakly && alpha >= 0.0 && self.rate(alpha) > 0.0
+    }
+
+    /// λ = λ_0 − α(λ_2 + λ~_2): the rate of V \[1/s\]. For the cascade (ρ_2 = 0) it is min(λ_1, (1 − α)λ_2 − αλ~_2).
+    pub fn rate(&self, alpha: f64) -> f64 {
+        if self.drive_2 == 0.0 {
+            return self.lambda_1.min((1.0 - alpha) * self.lambda_2 - alpha * self.growth_2);
+        }
+        self.lambda_0() - alpha * (self.lambda_2 + self.growth_2)
+    }
+
+    /// c = e^{(λ_2 + λ~_2)(1 − α)T_0} (4.20).
+    pub fn overshoot(&self, alpha: f64, t_0: Span) -> f64 {
+        ((self.lambda_2 + self.growth_2) * (1.0 - alpha) * t_0.secs()).exp()
+    }
+
+    /// w of V = V_1 + wV_2: (λ_1 − λ_0)/(ρ_2/α_1); `None` for the cascade, which has no such V.
+    pub fn weight(&self) -> Option<f64> {
+        (self.drive_2 > 0.0).then(|| (self.lambda_1 - self.lambda_0()) / self.drive_2)
+    }
+
+    /// That of Theorem 4.4 for type I: with (4.25), (4.29) and θ_1 = ½k_mλ_m.
+    pub fn of_type_1(fleet: &Coordination, lambda_1: f64, rho_1: f64, alpha_1: f64) -> Interconnection {
+        let Gains { n, k_m, k_max } = fleet.gains;
+        let theta_1 = 0.5 * fleet.speed();
+        Interconnection {
+            lambda_1,
+            lambda_2: 2.0 * (fleet.speed() - theta_1),
+            growth_2: 2.0 * theta_1,
+            // V_2 ≥ |γ~|²/(2k_M).
+            drive_1: rho_1 * (n as f64 * k_max).powi(2) * 2.0 * k_max,
+            drive_2: 1.0 / (4.0 * k_m * theta_1) / alpha_1,
+        }
+    }
+}
+
 /// The coordination subsystem and its network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordination {
@@ -55,11 +126,11 @@ impl Coordination {
         middle - (middle.powi(2) - self.speed() * lambda_1 * coupling).max(0.0).sqrt()
     }
 
-    /// The loss rate below which the theorem holds: λ_0/(2k_mλ_m) for type I, 1 for type II.
+    /// The loss rate below which the theorem holds: λ_0/(2k_mλ_m) for type I, zero if the coupling leaves none; 1 for type II.
     pub fn alpha_limit(&self, following: PathFollowing) -> f64 {
         match following {
             PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => {
-                self.lambda_0(lambda_1, rho_1, alpha_1) / (2.0 * self.speed())
+                (self.lambda_0(lambda_1, rho_1, alpha_1) / (2.0 * self.speed())).max(0.0)
             }
             PathFollowing::TypeII { .. } => 1.0,
         }
@@ -136,7 +207,7 @@ impl Coordination {
 
 #[cfg(test)]
 mod tests {
-    use super::Coordination;
+    use super::{Coordination, Interconnection};
     use crate::graph::Graph;
     use crate::graph::measure::Connectivity;
     use crate::graph::spectrum::l_beta;
@@ -227,6 +298,59 @@ mod tests {
                 let promised = overshoot * (-fleet.rate_of_agreement() * t.secs()).exp() * start;
                 let left = (&l_beta * &gamma).norm();
                 prop_assert!(left <= promised * (1.0 + 1e-9) + 1e-9, "{} {} at {}", left, promised, t);
+            }
+        }
+    }
+
+    #[test]
+    fn theorem_4_4_of_type_i_is_lemma_4_3() {
+        for (alpha_1, rho_1) in [(0.5, 0.0), (0.5, 1.0 / 72.0), (2.0, 0.1)] {
+            let fleet = remark_4_2(0.1);
+            let lemma = Interconnection::of_type_1(&fleet, 1.0, rho_1, alpha_1);
+            assert!((lemma.lambda_0() - fleet.lambda_0(1.0, rho_1, alpha_1)).abs() < 1e-12);
+            let following = TypeI { lambda_1: 1.0, rho_1, alpha_1 };
+            assert_eq!(lemma.holds(0.1), fleet.holds(following));
+            assert!(close(fleet.rate_of_v(following), lemma.rate(0.1)) || !lemma.holds(0.1));
+        }
+        let cascade = Interconnection { lambda_1: 3.0, lambda_2: 1.0, growth_2: 0.5, drive_1: 9.0, drive_2: 0.0 };
+        assert!((cascade.rate(0.2) - 0.7).abs() < 1e-12 && cascade.weight().is_none());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        /// z_1' = −a_1z_1 + b_1z_2, z_2' = −a_2(t)z_2 + b_2z_1 with V_i = z_i²: by 2|xy| ≤ θx² + y²/θ, λ_i = 2a_i − θ and
+        /// ρ_i = b_i²/θ, and while the second is unstable with a_2 = −g, λ~_2 = 2g + θ.
+        #[test]
+        fn two_systems_that_drive_each_other_decay_as_lemma_4_3_says(
+            (a_1, a_2, growth) in (0.5..2.0f64, 0.5..2.0f64, 0.0..0.3f64), (b_1, b_2) in (-0.5..0.5f64, -0.5..0.5f64),
+            (z_1, z_2) in (-3.0..3.0f64, -3.0..3.0f64), alpha in 0.0..0.3f64, seed in any::<u64>(),
+        ) {
+            let theta = 0.4;
+            let square = |b: f64| (b * b).max(1e-6) / theta;
+            let lemma = Interconnection {
+                lambda_1: 2.0 * a_1 - theta,
+                lambda_2: 2.0 * a_2 - theta,
+                growth_2: 2.0 * growth + theta,
+                drive_1: square(b_1),
+                drive_2: square(b_2),
+            };
+            let arcs = [(0, 1), (1, 0)];
+            let mut signal =
+                Switching::random(2, alpha.max(0.01), Span::from_secs(0.5), Span::from_secs(0.05), Stream::new(seed, "p"));
+            let end = Time::from_secs(15.0);
+            let t_0 = Connectivity::planned(signal.clone(), 2, &arcs, end).t_0(alpha);
+            let Some(w) = lemma.weight().filter(|_| lemma.holds(alpha)) else { return Ok(()) };
+            let v = |z: &DVector<f64>| z[0] * z[0] + w * z[1] * z[1];
+            let mut z = DVector::from_column_slice(&[z_1, z_2]);
+            let (start, mut t) = (v(&z), Time::ZERO);
+            while t < end {
+                let next = signal.next_change_after(t).unwrap_or(end).min(end);
+                let damping = if signal.is_up(0, t) { a_2 } else { -growth };
+                let flow = DMatrix::from_row_slice(2, 2, &[-a_1, b_1, b_2, -damping]);
+                z = (&flow * (next - t).secs()).exp() * z;
+                t = next;
+                let promised = lemma.overshoot(alpha, t_0) * (-lemma.rate(alpha) * t.secs()).exp() * start;
+                prop_assert!(v(&z) <= promised * (1.0 + 1e-9) + 1e-12, "{} {} at {}", v(&z), promised, t);
             }
         }
     }

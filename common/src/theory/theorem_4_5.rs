@@ -88,24 +88,28 @@ pub fn loop_gain(gains: Gains, agreement: Agreement, lambda_1: f64, rho_1: f64, 
 /// What the theorem says of a network that is connected in mean with T = `mean` (`None`: it is not) and that dwells
 /// for `dwell` in each graph.
 ///
-/// The rate is for two-way links and path following of type II; for one-way links, agreement holds without one
-/// (`two_way` false). Type I has a loop gain to keep below one; small gain gives no rate.
+/// Definition 4.4 is for two-way links; that one-way links do too is known from the literature (Moreau 2004, Lin 2006) and not
+/// covered here (`two_way` false). The rate is for path following of type II. Type I has a loop gain to keep below one; small
+/// gain gives no rate.
 pub fn verdict(gains: Gains, mean: Option<Span>, dwell: Span, two_way: bool, following: PathFollowing) -> Verdict {
     let proven = mean.filter(|_| two_way).and_then(|mean| agreement(gains, mean, dwell));
-    let connected = mean.map_or("never connected".to_owned(), |mean| format!("T = {mean}"));
+    let mut connected = mean.map_or("never connected".to_owned(), |mean| format!("T = {mean}"));
+    if !two_way {
+        connected += ", one-way links";
+    }
     match following {
         PathFollowing::TypeII { lambda_1 } => Verdict {
             name: "Theorem 4.5 (type II)",
-            condition: "connected in mean for some T".to_owned(),
+            condition: "two-way links, connected in mean for some T".to_owned(),
             value: connected,
-            holds: mean.is_some(),
+            holds: mean.is_some() && two_way,
             norm_rate: proven.map(|agreement| agreement.rate.min(0.5 * lambda_1)).filter(|&rate| rate > 0.0),
         },
         PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } => {
             let gain = proven.map(|agreement| loop_gain(gains, agreement, lambda_1, rho_1, alpha_1));
             Verdict {
                 name: "Theorem 4.5 (type I)",
-                condition: "connected in mean for some T, loop gain < 1".to_owned(),
+                condition: "two-way links, connected in mean for some T, loop gain < 1".to_owned(),
                 value: format!(
                     "{connected}, loop gain {}",
                     gain.map_or("unknown".to_owned(), |gain| format!("{gain:.4}"))
@@ -177,7 +181,8 @@ mod tests {
         let good = verdict(fleet, Some(s(10.0)), s(10.0), true, type_ii);
         assert!(good.holds && good.norm_rate.is_some_and(|rate| rate > 0.0));
         let one_way = verdict(fleet, Some(s(10.0)), s(10.0), false, type_ii);
-        assert_eq!((one_way.holds, one_way.norm_rate), (true, None));
+        assert_eq!((one_way.holds, one_way.norm_rate), (false, None));
+        assert!(one_way.value.ends_with("one-way links"));
         let never = verdict(fleet, None, s(10.0), true, type_ii);
         assert_eq!((never.holds, never.norm_rate), (false, None));
         let slow_following = verdict(fleet, Some(s(10.0)), s(10.0), true, TypeII { lambda_1: 1e-4 });

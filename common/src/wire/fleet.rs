@@ -91,6 +91,8 @@ pub struct VehicleStatus {
     pub phase: Phase,
     /// Why it refused or aborted, or nothing.
     pub reason: String,
+    /// When it last said where it is on its path, and where: ξ.
+    pub said: Option<(Time, f64)>,
 }
 
 /// How the fleet is.

@@ -19,6 +19,8 @@ pub struct Facts {
     pub duration_s: f64,
     /// Control period \[s\].
     pub control_period_s: f64,
+    /// A neighbour leaves N_i after this silence \[s\]; never, without.
+    pub validity_s: Option<f64>,
     /// Period of the switching network \[s\], if it is periodic.
     pub link_period_s: Option<f64>,
     /// The rate at which theory guarantees that the norm of the coordination error decays \[1/s\].

@@ -119,7 +119,8 @@ impl View<'_> {
             // Not further down than the measurement goes: the axis is for what was measured.
             let until = end.min(start + (factor * height / lowest).ln() / rate);
             let value = |time: f64| (time, factor * height * (-rate * (time - start)).exp());
-            let name = format!("guaranteed: {rate:.3} /s");
+            let name =
+                if rate < 0.01 { format!("guaranteed: {rate:.5} /s") } else { format!("guaranteed: {rate:.3} /s") };
             panel.names.push(name.clone());
             panel.line(vec![value(start), value(until)], |line| {
                 line.with_color(PLANNED).with_stroke_width(1.8).with_dotted().with_legend(name)

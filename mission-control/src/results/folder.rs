@@ -19,6 +19,15 @@ pub struct Account {
     pub reproduce: Vec<String>,
 }
 
+/// What theory says of a flight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Theory {
+    /// Beside measurement.
+    pub rows: Vec<TheoryRow>,
+    /// Rate \[1/s\] and, where it is known, factor of the envelope that it guarantees, with the network as measured.
+    pub envelope: Option<(f64, Option<f64>)>,
+}
+
 /// Writes `summary.json`, `theory.json`, `clock.json`, `figures/*.svg` and `report.html` into a run folder. Each file appears whole
 /// or not at all, and replaces an earlier one, so that a report can be made again at any time. `theory` is asked for
 /// its table once the measured numbers are known. A failure names the file.
@@ -26,12 +35,20 @@ pub fn write_run_folder(
     directory: impl AsRef<Path>,
     recording: &Recording,
     facts: &Facts,
-    theory: impl FnOnce(&Summary) -> Vec<TheoryRow>,
+    theory: impl FnOnce(&Summary) -> Theory,
     account: &Account,
 ) -> io::Result<Summary> {
     let directory = directory.as_ref();
-    let (summary, clock) = (summarise(recording, facts), summarise_clock(recording));
-    let (figures, theory) = (figures(recording, facts), theory(&summary));
+    let (mut summary, clock) = (summarise(recording, facts), summarise_clock(recording));
+    let Theory { rows: theory, envelope } = theory(&summary);
+    // What is drawn and compared is what is guaranteed for the network as it was, not as it was planned.
+    let facts = &Facts {
+        guaranteed_rate: envelope.map(|envelope| envelope.0),
+        guaranteed_factor: envelope.and_then(|envelope| envelope.1),
+        ..facts.clone()
+    };
+    summary.fleet.coordination.hold_against(facts.guaranteed_rate);
+    let figures = figures(recording, facts);
     let page = report(&Report {
         facts,
         summary: &summary,
@@ -82,9 +99,9 @@ mod tests {
     use super::super::testing::{facts, fleet};
     use super::*;
 
-    fn theory(summary: &Summary) -> Vec<TheoryRow> {
+    fn theory(summary: &Summary) -> Theory {
         let fitted = summary.fleet.coordination.fit.map_or(0.0, |fit| fit.rate);
-        vec![
+        let rows = vec![
             TheoryRow {
                 name: "Theorem 4.3".into(),
                 condition: "brief connectivity losses: α = 0.75 < 1".into(),
@@ -101,7 +118,8 @@ mod tests {
                 measured: format!("{:.4} /s", summary.fleet.steady_speed),
                 ..TheoryRow::default()
             },
-        ]
+        ];
+        Theory { rows, envelope: Some((0.012, Some(1.3))) }
     }
 
     fn write_fleet(directory: &Path, spatial: bool) -> Summary {
@@ -133,6 +151,22 @@ mod tests {
         assert_eq!(files(&directory.path().join("figures")).len(), 3);
         write_fleet(directory.path(), true);
         assert!(files(directory.path()) == first, "the same recording gives the same files");
+    }
+
+    #[test]
+    fn the_envelope_of_the_measured_network_is_drawn_and_compared() {
+        let directory = tempfile::tempdir().expect("directory");
+        let write = |envelope| {
+            let said = |_: &Summary| Theory { rows: Vec::new(), envelope };
+            let (facts, account) = (facts(true), Account::default());
+            let summary = write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");
+            let drawn = fs::read_to_string(directory.path().join("figures/rate.svg")).expect("reads");
+            (summary.fleet.coordination.at_least_guaranteed, drawn.contains("guaranteed: 0.020 /s"))
+        };
+        assert_eq!(write(Some((0.02, Some(2.0)))), (Some(true), true));
+        assert_eq!(write(Some((0.03, None))).0, Some(false));
+        // The plan promises something (the facts do), the network as it was does not.
+        assert_eq!(write(None), (None, false));
     }
 
     #[test]

@@ -32,13 +32,13 @@ pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts};
 pub use figures::{Figure, figures};
-pub use folder::{Account, write_run_folder};
+pub use folder::{Account, Theory, write_run_folder};
 pub use network::{Connectivity, LinkSummary, Network, Spread};
 pub use report::{Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
 pub use statistics::{ExponentialFit, fit_exponential, settling_time};
 pub use summary::{
-    ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
-    Summary, VehicleSummary, summarise, summarise_clock,
+    Absence, ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals,
+    NoteSummary, Summary, VehicleSummary, summarise, summarise_clock,
 };
 pub use trace::network_section;

@@ -186,6 +186,45 @@ pub struct Connectivity {
     /// The smallest T \[s\] such that the union of the graph over every interval of length T is connected in that
     /// sense; `None` if the end of the run was reached without.
     pub t_s: Option<f64>,
+    /// How long was measured \[s\].
+    pub length_s: f64,
+    /// The shortest time between two changes \[s\]; the whole time before the second.
+    pub dwell_s: f64,
+    /// The shortest time that a link was up before it went down \[s\]; the whole time, if none went down.
+    pub shortest_up_s: f64,
+    /// The greatest age, since it was sent, of what a vehicle used of a neighbour \[s\]; `None` if nothing was heard.
+    pub oldest_news_s: Option<f64>,
+    /// The part of its up time in which a link was up and its sender not a neighbour, for the link that is worst.
+    pub unheard: f64,
+}
+
+/// When what was delivered on one link made its sender a neighbour, and how old it was at most.
+#[derive(Debug, Default)]
+struct Heard {
+    times: Vec<(f64, f64)>,
+    oldest: Option<f64>,
+}
+
+impl Heard {
+    /// From (sent, arrived) in order of arrival \[s\]: a neighbour leaves after a silence of `validity` \[s\].
+    fn of(messages: &[(f64, f64)], validity: f64, end: f64) -> Heard {
+        let mut heard = Heard::default();
+        // Of what was sent, the newest counts, whatever arrives after it.
+        let mut newest = f64::NEG_INFINITY;
+        for (index, (sent, arrived)) in messages.iter().enumerate() {
+            newest = newest.max(*sent);
+            let next = messages.get(index + 1).map_or(f64::INFINITY, |next| next.1);
+            let until = next.min(arrived + validity).min(end);
+            if until >= *arrived {
+                heard.oldest = Some(heard.oldest.unwrap_or(0.0).max(until - newest));
+            }
+            match heard.times.last_mut() {
+                Some(last) if *arrived <= last.1 => last.1 = last.1.max(until),
+                _ => heard.times.push((*arrived, until)),
+            }
+        }
+        heard
+    }
 }
 
 impl Network {
@@ -257,7 +296,60 @@ impl Network {
             rise = rise.max(value - lowest);
         }
         let t_0_s = (alpha < 1.0).then(|| rise / (1.0 - alpha));
-        Some(Connectivity { alpha, t_0_s, t_s: union_period(count, &pieces, &connected) })
+        let length_s = self.end_s - self.start_s;
+        Some(Connectivity {
+            alpha,
+            t_0_s,
+            t_s: union_period(count, &pieces, &connected),
+            length_s,
+            dwell_s: dwell(&pieces).unwrap_or(length_s),
+            shortest_up_s: length_s,
+            oldest_news_s: None,
+            unheard: 0.0,
+        })
+    }
+
+    /// The same network, looked at until then \[s\].
+    pub fn until(&self, end_s: f64) -> Network {
+        let end_s = end_s.min(self.end_s);
+        let kept = |changes: &Vec<(f64, bool)>| changes.iter().copied().filter(|(at, _)| *at < end_s).collect();
+        let changes = self.changes.iter().map(|(link, changes)| (link.clone(), kept(changes))).collect();
+        Network { start_s: self.start_s, end_s, changes }
+    }
+
+    /// The measured connectivity with what was heard: how messages filled the times in which links were up.
+    pub fn connectivity_heard(&self, exact: &[Record], facts: &Facts) -> Option<Connectivity> {
+        let mut connectivity = self.connectivity(facts)?;
+        let mut messages: BTreeMap<(&str, &str), Vec<(f64, f64)>> = BTreeMap::new();
+        let handed_over = |row: &&MessageRow| matches!(row.fate, Fate::Delivered | Fate::Copied);
+        let rows = exact.iter().filter_map(|record| match record {
+            Record::Message(row) => Some(row),
+            _ => None,
+        });
+        for row in rows.filter(handed_over).filter(|row| row.due_ns as f64 / 1e9 < self.end_s) {
+            let times = (row.sent_ns as f64 / 1e9, row.due_ns as f64 / 1e9);
+            messages.entry((&row.from, &row.to)).or_default().push(times);
+        }
+        let validity = facts.validity_s.unwrap_or(f64::INFINITY);
+        for (from, to) in &facts.links {
+            let down = self.down_times(from, to);
+            let up = complement(&down, self.start_s, self.end_s);
+            let ended = up.iter().filter(|(_, until)| *until < self.end_s).map(|(from, until)| until - from);
+            connectivity.shortest_up_s = ended.fold(connectivity.shortest_up_s, f64::min);
+            let mut own = messages.remove(&(from.as_str(), to.as_str())).unwrap_or_default();
+            own.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
+            let heard = Heard::of(&own, validity, self.end_s);
+            let lasts = |times: &[(f64, f64)]| times.iter().map(|(from, to)| to - from).sum::<f64>();
+            let up_s = lasts(&up);
+            if up_s > 0.0 {
+                let unheard = 1.0 - lasts(&intersection(&up, &heard.times)) / up_s;
+                connectivity.unheard = connectivity.unheard.max(unheard.clamp(0.0, 1.0));
+            }
+            if let Some(oldest) = heard.oldest {
+                connectivity.oldest_news_s = Some(connectivity.oldest_news_s.unwrap_or(0.0).max(oldest));
+            }
+        }
+        Some(connectivity)
     }
 
     /// The run cut at every change of a link, with the edges that are up in each piece.
@@ -294,6 +386,27 @@ impl Network {
 struct Piece {
     length_s: f64,
     edges: BTreeSet<(usize, usize)>,
+}
+
+/// The shortest time between two changes; `None` before the second.
+fn dwell(pieces: &[Piece]) -> Option<f64> {
+    let mut lengths: Vec<(f64, &BTreeSet<(usize, usize)>)> = Vec::new();
+    for piece in pieces {
+        match lengths.last_mut() {
+            Some((length, edges)) if **edges == piece.edges => *length += piece.length_s,
+            _ => lengths.push((piece.length_s, &piece.edges)),
+        }
+    }
+    let inner = lengths.len().checked_sub(2).map_or(&[][..], |inner| &lengths[1..=inner]);
+    inner.iter().map(|(length, _)| *length).min_by(f64::total_cmp)
+}
+
+/// What intervals leave of a time.
+fn complement(intervals: &[(f64, f64)], start: f64, end: f64) -> Vec<(f64, f64)> {
+    let ends = intervals.iter().map(|interval| interval.1);
+    let begins = intervals.iter().map(|interval| interval.0);
+    let left = [start].into_iter().chain(ends).zip(begins.chain([end]));
+    left.filter(|(from, to)| to > from).collect()
 }
 
 /// The longest wait, over all instants, until the links seen since then connect the fleet. It is longest just after
@@ -489,5 +602,33 @@ mod tests {
         let connected = |edges: &[(usize, usize)]| has_root(3, &edges.iter().copied().collect());
         assert!(connected(&[(0, 1), (1, 2)]));
         assert!(!connected(&[(0, 1), (2, 1)]));
+    }
+
+    #[test]
+    fn what_was_heard_is_measured() {
+        // Up from 10 s to 12 s and from 20 s to 24 s, and words at 11 s, 20 s and 22 s that count for a second and a half.
+        let ms = |at: f64| (at * 1e9) as i64;
+        let mut rows: Vec<Record> = [(10, true), (12, false), (20, true), (24, false)]
+            .into_iter()
+            .map(|(at, up)| change(at, "1", "2", up))
+            .collect();
+        for (seq, at, fate) in [(0, 9.0, Fate::LinkDown), (1, 11.0, Fate::Delivered), (2, 20.0, Fate::Delivered)] {
+            rows.push(message(seq, ms(at) - 5_000_000_000, fate));
+        }
+        rows.push(message(3, ms(22.0) - 5_000_000_000, Fate::Delivered));
+        let mut facts = facts(&[("1", "2")]);
+        facts.validity_s = Some(1.5);
+        let network = Network::of(&rows, &facts);
+        let measured = network.connectivity_heard(&rows, &facts).expect("three vehicles");
+        assert_eq!((measured.shortest_up_s, measured.oldest_news_s), (2.0, Some(6.5)));
+        // 1 s, 1.5 s and 1.5 s of 6 s were heard.
+        assert!((measured.unheard - 2.0 / 6.0).abs() < 1e-12, "{}", measured.unheard);
+        assert_eq!((measured.dwell_s, measured.length_s), (2.0, 100.0));
+        // Whoever never leaves is used until the end, however old the news.
+        facts.validity_s = None;
+        let measured = network.connectivity_heard(&rows, &facts).expect("three vehicles");
+        assert_eq!(measured.oldest_news_s, Some(100.0 - 17.0));
+        let early = network.until(11.5).connectivity_heard(&rows, &facts).expect("three vehicles");
+        assert_eq!((early.length_s, early.shortest_up_s), (11.5, 11.5));
     }
 }

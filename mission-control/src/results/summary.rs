@@ -67,6 +67,21 @@ pub struct FleetSummary {
     pub messages: MessageTotals,
     /// Measured connectivity of the network.
     pub connectivity: Option<Connectivity>,
+    /// When vehicles recorded nothing, in order of time.
+    pub absences: Vec<Absence>,
+    /// The connectivity before the first of these, if there is one.
+    pub connectivity_before: Option<Connectivity>,
+}
+
+/// A time in which a vehicle recorded nothing.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Absence {
+    /// The vehicle.
+    pub vehicle: String,
+    /// Its last row before \[s\].
+    pub from_s: f64,
+    /// Its next row, or the end \[s\].
+    pub to_s: f64,
 }
 
 /// How the fleet agreed. x_i = ξ_i − h_i, the coordination state with the pattern removed.
@@ -277,6 +292,8 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
     let links = links(exact, facts, &network);
     let said = transmissions(exact);
     let vehicles: Vec<VehicleSummary> = tracks.iter().map(|track| vehicle(track, &tracks, facts, &said)).collect();
+    let absences = absences(&tracks, facts);
+    let first_absence = absences.first().map(|absence| absence.from_s);
     let present = || vehicles.iter().filter(|vehicle| vehicle.rows > 0);
     let fleet = FleetSummary {
         steady_speed: mean(present().map(|vehicle| vehicle.steady_speed)),
@@ -286,7 +303,9 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         path_error_final_m: largest(present().map(|vehicle| vehicle.path_error_final_m)),
         on_path_s: present().map(|vehicle| vehicle.on_path_s).collect::<Option<Vec<f64>>>().map(largest),
         messages: totals(&links, &said, facts),
-        connectivity: network.connectivity(facts),
+        connectivity: network.connectivity_heard(exact, facts),
+        connectivity_before: first_absence.and_then(|at| network.until(at).connectivity_heard(exact, facts)),
+        absences,
         coordination: coordination_summary(&coordination, facts),
     };
     let complete = recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);
@@ -351,6 +370,26 @@ pub fn summarise_clock(recording: &Recording) -> ClockSummary {
     summary
 }
 
+/// A vehicle that records nothing for this many control periods, or for two and a half times as long as usual, is not there.
+const SILENT_PERIODS: f64 = 10.5;
+
+/// The times in which vehicles recorded nothing.
+fn absences(tracks: &[Track<'_>], facts: &Facts) -> Vec<Absence> {
+    let mut absences = Vec::new();
+    for track in tracks {
+        let times: Vec<f64> = track.rows.iter().map(|row| row.t_ns as f64 / 1e9).collect();
+        let mut usual: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        usual.sort_by(f64::total_cmp);
+        let usual = usual.get(usual.len() / 2).copied().unwrap_or(0.0);
+        let longest = (2.5 * usual).max(SILENT_PERIODS * facts.control_period_s);
+        let known = [0.0].into_iter().chain(times).chain([facts.duration_s]).collect::<Vec<f64>>();
+        let gaps = known.windows(2).filter(|pair| pair[1] - pair[0] > longest);
+        absences.extend(gaps.map(|pair| Absence { vehicle: track.id.to_owned(), from_s: pair[0], to_s: pair[1] }));
+    }
+    absences.sort_by(|a, b| a.from_s.total_cmp(&b.from_s).then_with(|| a.vehicle.cmp(&b.vehicle)));
+    absences
+}
+
 fn coordination_summary(coordination: &Coordination, facts: &Facts) -> CoordinationSummary {
     let (t_s, spread, norm) = (&coordination.t_s, coordination.spread(), coordination.norm());
     let peak = largest(spread.iter().copied());
@@ -358,7 +397,7 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts) -> Coordinat
     let kept = thinned(t_s.len(), SERIES_SAMPLES);
     let pick = |values: &[f64]| kept.iter().map(|index| values[*index]).collect();
     let steady = steady_part(t_s, facts);
-    CoordinationSummary {
+    let mut summary = CoordinationSummary {
         unit: facts.xi_unit.clone(),
         initial: spread.first().copied().unwrap_or(0.0),
         largest: peak,
@@ -368,9 +407,19 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts) -> Coordinat
         settled_s: settling_time(t_s, &spread, SETTLED_PART * peak),
         settled_absolute_s: settling_time(t_s, &spread, COORDINATION_THRESHOLD),
         fit,
-        guaranteed_rate: facts.guaranteed_rate,
-        at_least_guaranteed: fit.zip(facts.guaranteed_rate).map(|(fit, guaranteed)| fit.rate >= guaranteed),
+        guaranteed_rate: None,
+        at_least_guaranteed: None,
         series: CoordinationSeries { t_s: pick(t_s), largest: pick(&spread), norm: pick(&norm) },
+    };
+    summary.hold_against(facts.guaranteed_rate);
+    summary
+}
+
+impl CoordinationSummary {
+    /// Takes this as the rate that theory guarantees.
+    pub(super) fn hold_against(&mut self, guaranteed_rate: Option<f64>) {
+        self.guaranteed_rate = guaranteed_rate;
+        self.at_least_guaranteed = self.fit.zip(guaranteed_rate).map(|(fit, guaranteed)| fit.rate >= guaranteed);
     }
 }
 
@@ -590,5 +639,18 @@ mod tests {
         let summary = summarise(&lacking, &facts(true));
         assert!(!summary.fleet.messages.balanced);
         assert_eq!(summary.warnings.len(), 2, "{:?}", summary.warnings);
+    }
+
+    #[test]
+    fn a_vehicle_that_falls_silent_is_absent() {
+        let mut recording = fleet(true);
+        assert_eq!(summarise(&recording, &facts(true)).fleet.absences, []);
+        let silent = |row: &StateRow| &*row.vehicle == "v3" && (57_000_000_000..90_000_000_000).contains(&row.t_ns);
+        let late = |row: &StateRow| &*row.vehicle == "v2" && row.t_ns > 300_000_000_000;
+        recording.exact.retain(|record| !matches!(record, Record::State(row) if silent(row) || late(row)));
+        let fleet = summarise(&recording, &facts(true)).fleet;
+        let absence = |vehicle: &str, from_s, to_s| Absence { vehicle: vehicle.into(), from_s, to_s };
+        assert_eq!(fleet.absences, [absence("v3", 56.9, 90.0), absence("v2", 300.0, 400.0)]);
+        assert_eq!(fleet.connectivity_before.map(|before| before.length_s), Some(56.9));
     }
 }

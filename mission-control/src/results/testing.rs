@@ -50,6 +50,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         message_bytes: 40,
         duration_s: 400.0,
         control_period_s: 0.1,
+        validity_s: Some(1.5),
         link_period_s: Some(10.0),
         guaranteed_rate: Some(0.012),
         guaranteed_factor: Some(1.3),

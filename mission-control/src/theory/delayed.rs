@@ -4,9 +4,11 @@ use common::mission::Mission;
 use common::mission::file::{Delayed, LawChoice};
 use common::theory::delay::{self, DelayGains};
 use common::theory::delay_rate;
+use common::theory::monitor::Watched;
 use common::time::Span;
 
 use super::Case;
+use super::premises::{premises_of_late_news, too_rare};
 use crate::results::TheoryRow;
 
 pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
@@ -16,23 +18,20 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
     let in_mean = network.planned.connected_in_mean().is_some();
     let verdict = delay::verdict(DelayGains::Averaged(law.gain), tau, v_l, in_mean);
     let bears_losses = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_));
-    let always_heard = bears_losses || network.leaves_nobody_alone();
-    let told = told_truly(mission, law.delay_s) && mission.loses_by_switching_only();
-    let holds = verdict.holds && always_heard && told;
+    let broken = premises_of_late_news(mission, network, tau);
+    let rare = too_rare(mission, network, &Watched::Delayed);
+    let holds = verdict.holds && broken.is_empty() && rare.is_empty();
     let mut value = verdict.value.clone();
-    if !always_heard {
-        value += "; at times a vehicle hears nobody";
-    }
-    if !told {
-        value += "; messages are lost, or not as late as the law was told";
+    for found in broken.iter().map(|premise| &premise.found).chain(&rare) {
+        value += &format!("; {found}");
     }
     // On a network that never changes the rate is known exactly.
     let rate = (holds && network.graphs.len() == 1).then(|| delay_rate::rate(&network.graph, law.gain, tau)).flatten();
     vec![TheoryRow {
         condition: if bears_losses {
-            format!("{}, every message τ late and none lost but by the switching", verdict.condition)
+            format!("{}, type II, every message τ late and none lost but by the switching", verdict.condition)
         } else {
-            format!("{}, every vehicle always hears someone, every message τ late", verdict.condition)
+            format!("{}, type II, every vehicle always hears someone, every message τ late", verdict.condition)
         },
         value,
         holds: Some(holds),

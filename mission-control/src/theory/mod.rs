@@ -15,7 +15,9 @@
 //! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
 //! | switching networks | Theorems 4.4, 4.5 | `switching.rs` |
 //! | late information | Lemmas 4.4, 4.5 | `delayed.rs` |
-//! | the run as flown, or so far | Theorems 4.4, 4.5, Lemmas 4.4–4.7 | `watched.rs` |
+//! | what those of chapter 4 take for granted | sections 4.1, 4.4 | `premises.rs` |
+//! | the run as flown | Theorems 4.4, 4.5, Lemmas 4.4–4.7 | `watched.rs` |
+//! | the run so far | the same | `so_far.rs` |
 //! | curves that need no run | Figure 2.8 and others | [`figures()`] |
 //!
 //! The mathematics is in `common::theory`; here is only which statement speaks of which mission, and in which words.
@@ -28,6 +30,8 @@ mod fleet;
 mod introduction;
 mod learned_speeds;
 mod network;
+mod premises;
+mod so_far;
 mod solutions;
 mod switching;
 mod talk;
@@ -40,8 +44,9 @@ use common::theory::Verdict;
 use common::theory::linear_coordination::Law;
 
 pub use figures::figures;
+pub use so_far::{SoFar, so_far};
 pub use talk::speed_factor;
-pub use watched::so_far;
+pub use watched::{envelope_over, guarantee_of_flight};
 
 use crate::results::{Summary, TheoryRow};
 use network::Network;

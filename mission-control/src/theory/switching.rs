@@ -1,17 +1,19 @@
 //! Coordination over a switching network, (4.21).
 
-use common::mission::Mission;
-use common::mission::file::{FollowingChoice, FollowingType, GainOnly};
+use common::mission::file::GainOnly;
+use common::theory::monitor::Watched;
 use common::theory::theorem_4_4::Coordination;
-use common::theory::{Gains, theorem_4_5};
+use common::theory::{Gains, PathFollowing, theorem_4_5};
 use common::time::Time;
 
+pub(super) use super::premises::moves_as_told;
+use super::premises::{following, late_or_lost, too_rare};
 use super::{Case, Guarantee};
 use crate::results::TheoryRow;
 
 /// Theorem 4.4 for targets that move as told.
 pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
-    if !(case.network.immediate && moves_as_told(case.mission)) {
+    if !(case.network.immediate && moves_as_told(case.mission)) || case.network.cut_off || !rare(case, law).is_empty() {
         return None;
     }
     let coordination = coordination(case, law)?;
@@ -24,16 +26,11 @@ fn coordination(case: &Case<'_>, law: &GainOnly) -> Option<Coordination> {
     Coordination::new(&case.network.graphs, &gains, case.network.alpha())
 }
 
-/// Whether the virtual targets move at exactly the rate the law asks for (path following of type II, η = 0).
-pub(super) fn moves_as_told(mission: &Mission) -> bool {
-    mission
-        .vehicles
-        .iter()
-        .all(|v| matches!(&v.following, FollowingChoice::Theorem47(gains) if gains.kind == FollowingType::II))
-}
-
 pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
-    let (four, five) = (theorem_4_4(case, law), theorem_4_5(case, law));
+    let (four, five) = match following(case.mission) {
+        Ok(type_1 @ PathFollowing::TypeI { .. }) => return rows_of_type_1(case, law, type_1),
+        _ => (theorem_4_4(case, law), theorem_4_5(case, law)),
+    };
     // One of the two is enough: the one that covers the mission is shown, both if both do.
     match (four.holds, five.holds) {
         (Some(true), Some(true)) => vec![four, five],
@@ -42,15 +39,81 @@ pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
     }
 }
 
+/// Both theorems for targets with dynamics of their own (4.53): errors go into a ball that δ and other disturbances set.
+fn rows_of_type_1(case: &Case<'_>, law: &GainOnly, type_1: PathFollowing) -> Vec<TheoryRow> {
+    let network = &case.network;
+    let met = network.immediate && !network.cut_off && rare(case, law).is_empty();
+    let PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } = type_1 else { return Vec::new() };
+    let constants = format!("λ₁ = {lambda_1:.5} 1/s, ρ₁ = {rho_1:.5}, α₁ = {alpha_1:.2}{}", obstacles(case, law));
+    let four = coordination(case, law).map(|coordination| coordination.verdict(type_1));
+    let four = match four {
+        Some(verdict) => TheoryRow {
+            condition: format!("two-way links, no delay, no loss; {}", verdict.condition),
+            value: format!("{}; {constants}", verdict.value),
+            holds: Some(verdict.holds && met),
+            predicted: verdict.norm_rate.filter(|_| met).map_or("–".into(), |rate| {
+                format!("path following and coordination decay at ≥ {rate:.5} 1/s into a ball")
+            }),
+            guaranteed_rate: None,
+            ..case.row(verdict)
+        },
+        None => TheoryRow {
+            name: "Theorem 4.4 (type I)".into(),
+            condition: "two-way links that connect the fleet at times".into(),
+            value: format!("one-way links, or never connected; {constants}"),
+            holds: Some(false),
+            predicted: "–".into(),
+            measured: case.fitted_rate(),
+            ..TheoryRow::default()
+        },
+    };
+    let five = Gains::new(&vec![law.gain; case.mission.vehicles.len()]).map(|gains| {
+        let verdict =
+            theorem_4_5::verdict(gains, network.planned.connected_in_mean(), dwell(case), two_way(case), type_1);
+        TheoryRow {
+            condition: format!("{}, no delay, no loss", verdict.condition),
+            value: format!("{}; {constants}", verdict.value),
+            holds: Some(verdict.holds && met),
+            predicted: if verdict.holds && met { "agreement into a ball, no rate".into() } else { "–".into() },
+            ..case.row(verdict)
+        }
+    });
+    [four].into_iter().chain(five).collect()
+}
+
+fn dwell(case: &Case<'_>) -> common::time::Span {
+    case.network.planned.dwell().unwrap_or(case.mission.end - Time::ZERO)
+}
+
+/// Whether no link is ever up in one direction alone.
+fn two_way(case: &Case<'_>) -> bool {
+    case.network.graphs.iter().all(common::graph::Graph::is_undirected)
+}
+
+/// The conditions on messages in periods that the plan does not meet.
+fn rare(case: &Case<'_>, law: &GainOnly) -> Vec<String> {
+    let gains = vec![law.gain; case.mission.vehicles.len()];
+    let watched = Watched::Agreement(gains, PathFollowing::TypeII { lambda_1: f64::INFINITY });
+    too_rare(case.mission, &case.network, &watched)
+}
+
 /// What is in the way of both theorems.
-fn obstacles(case: &Case<'_>) -> String {
+fn obstacles(case: &Case<'_>, law: &GainOnly) -> String {
     let mut obstacles = String::new();
-    if !case.network.immediate {
-        obstacles += "; messages are late or lost";
+    if let Some(premise) = late_or_lost(case.mission, common::time::Span::ZERO) {
+        obstacles += &format!("; messages: {}", premise.found);
     }
-    if !moves_as_told(case.mission) {
-        obstacles += "; targets do not move just as told (type I or a law of chapter 3), and the constants of \
-                      Assumption 4.1 are not known for them";
+    if let Err(premise) = following(case.mission) {
+        obstacles += &format!("; the constants of Assumption 4.1 are not known: {}", premise.found);
+    }
+    if !two_way(case) {
+        obstacles += "; one-way links, which the thesis leaves to the literature";
+    }
+    for rare in rare(case, law) {
+        obstacles += &format!("; {rare}");
+    }
+    if case.network.cut_off {
+        obstacles += "; only the graphs of the first 20000 changes were looked at";
     }
     obstacles
 }
@@ -60,12 +123,12 @@ fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
     let lambda_m = coordination(case, law).map_or("unknown".to_string(), |c| format!("{:.5}", c.lambda_m));
     TheoryRow {
         name: "Theorem 4.4 (rate of the norm, erratum 4.4)".into(),
-        condition: "two-way links, α < 1, no delay, no loss, targets that move as told (type II)".into(),
+        condition: "two-way links, α < 1, no delay, no loss, short periods, targets that move as told (type II)".into(),
         value: format!(
             "α = {:.4}, k_m = {:.4} 1/s, λ_m = {lambda_m}{}",
             case.network.alpha(),
             law.gain,
-            obstacles(case)
+            obstacles(case, law)
         ),
         holds: Some(guarantee.is_some()),
         predicted: guarantee.map_or("–".into(), |g| format!("‖e‖ decays at ≥ {:.5} 1/s", g.rate)),
@@ -76,26 +139,29 @@ fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
 
 fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
     let Case { mission, network, .. } = case;
-    let immediate = network.immediate && moves_as_told(mission);
+    let met =
+        network.immediate && moves_as_told(mission) && two_way(case) && !network.cut_off && rare(case, law).is_empty();
     let mean = network.planned.connected_in_mean();
-    let dwell = network.planned.dwell().unwrap_or(mission.end - Time::ZERO);
+    let dwell = dwell(case);
     let proven = Gains::new(&vec![law.gain; mission.vehicles.len()])
         .zip(mean)
-        .filter(|_| network.graph.is_undirected() && immediate)
+        .filter(|_| met)
         .and_then(|(gains, mean)| theorem_4_5::agreement(gains, mean, dwell))
         .filter(|proven| proven.rate > 0.0);
     TheoryRow {
         name: "Theorem 4.5 (its printed rate is no bound; this one is proven, erratum 4.7)".into(),
-        condition: "connected in mean, no delay, no loss, targets that move as told (type II)".into(),
+        condition:
+            "two-way links, connected in mean, no delay, no loss, short periods, targets that move as told (type II)"
+                .into(),
         value: format!(
             "{}, dwell time {dwell}{}",
             mean.map_or("never connected in mean".to_string(), |mean| format!("T = {mean}")),
-            obstacles(case)
+            obstacles(case, law)
         ),
-        holds: Some(mean.is_some() && immediate),
+        holds: Some(mean.is_some() && met),
         predicted: match proven {
             Some(proven) => format!("‖e‖ decays at ≥ {:.5} 1/s", proven.rate),
-            None if mean.is_some() && immediate => "agreement, no rate".into(),
+            None if mean.is_some() && met => "agreement, no rate".into(),
             None => "–".into(),
         },
         guaranteed_rate: proven.map(|proven| proven.rate),

@@ -37,12 +37,26 @@ pub(super) fn rows_of_known_delay(case: &Case<'_>, law: &KnownDelay) -> Vec<Theo
     let held = mission.control_period * (mission.message_ticks + 1);
     let turn = greatest_delay(mission).and_then(|slowest| known_delay::turn(&network.graph, law.gain, slowest + held));
     let below = turn.is_some_and(|turn| turn < std::f64::consts::FRAC_PI_2);
-    let quiet = network.graphs.len() == 1 && mission.talk.is_none() && mission.loses_by_switching_only();
+    let one_delay = common_delay(mission).is_some();
+    let fixed = network.graphs.len() == 1;
+    let connected = network.graph.is_undirected() && network.graph.is_connected();
+    let whole = mission.talk.is_none() && mission.loses_by_switching_only();
+    let lacks = [
+        (fixed, "the network changes"),
+        (connected, "one-way links, or not connected"),
+        (one_delay, "delays differ"),
+        (whole, "messages are lost, or not said"),
+        (below, "that is π/2 or more, or has no bound"),
+    ];
+    let lacks: String = lacks.iter().filter(|(met, _)| !met).map(|(_, lack)| format!("; {lack}")).collect();
     vec![TheoryRow {
         name: "Agreement with known delay".into(),
-        condition: "fixed two-way network, one delay τ for all links, kλ_max τ < π/2 = 1.571".into(),
-        value: turn.map_or("–".into(), |turn| format!("kλ_max τ = {turn:.3} with the oldest news")),
-        holds: Some(quiet && common_delay(mission).is_some() && below && network.graph.is_connected()),
+        condition: "fixed two-way connected network, one delay τ for all links, nothing lost, kλ_max τ < π/2 = 1.571"
+            .into(),
+        value: turn
+            .map_or("kλ_max τ has no bound".into(), |turn| format!("kλ_max τ = {turn:.3} with the oldest news"))
+            + &lacks,
+        holds: Some(lacks.is_empty()),
         predicted: "agreement at v_L".into(),
         measured: case.fitted_rate(),
         ..TheoryRow::default()

@@ -1,102 +1,354 @@
-//! The theorem monitor over a mission: a flight that is over, or one so far.
+//! The theorem monitor over a flight that is over.
+//!
+//! Laws of chapter 4 are held against Theorems 4.4 and 4.5, Lemma 4.7, or Lemmas 4.4 and 4.5, with the switching signal as
+//! measured. Of the others, what their own statements say is repeated in the monitor's words.
 
+use common::graph::Graph;
 use common::mission::Mission;
-use common::mission::file::LawChoice;
-use common::theory::monitor::{self, Judgement, Seen, Watch, Watched};
-use common::time::{Span, Time};
+use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch, Watched};
+use common::time::Span;
 
-use super::Case;
 use super::network::Network;
-use super::switching::moves_as_told;
-use crate::results::{Summary, TheoryRow};
+use super::premises::{Looked, age, looked_for, tolerance};
+use super::{Case, Guarantee, guarantee_of, law_rows};
+use crate::results::{Absence, Connectivity, Summary, TheoryRow};
 
-/// What the monitor watches in this mission; `None` if it has no statement about its law, or if a premise that is
-/// not about the switching is missing (other rows say so).
-fn watched(mission: &Mission, network: &Network) -> Option<Watched> {
-    let n = mission.vehicles.len();
-    match &mission.law_choice {
-        LawChoice::Switching(law) if network.immediate && moves_as_told(mission) => {
-            Some(Watched::Agreement(vec![law.gain; n]))
-        }
-        LawChoice::AuxiliarySwitching(law) if network.immediate && moves_as_told(mission) => {
-            Some(Watched::Dynamic(law.a1, law.a2))
-        }
-        LawChoice::DelayedWithLosses(_) => Some(Watched::Delayed),
-        LawChoice::Delayed(_) if network.leaves_nobody_alone() => Some(Watched::Delayed),
-        _ => None,
-    }
-}
+/// Asked of every fleet.
+const PRESENT: &str = "every vehicle all the time";
 
-/// What sampling may add to the errors: neighbours are heard up to a message period and two control periods late, and a
-/// fleet at v_L has moved on by then.
-fn tolerance(mission: &Mission, summary: &Summary) -> f64 {
-    let period = mission.control_period.secs();
-    let late = period * (mission.message_ticks as f64 + 2.0);
-    let n = mission.vehicles.len() as f64;
-    n * late * mission.speed.fastest() + 0.01 * summary.fleet.coordination.initial
-}
-
-/// After a flight: covered, not covered, or a defect.
+/// After a flight: covered, not covered, or a defect; `None` for a fleet of one.
 pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
-    let summary = case.summary?;
-    let network = &case.network;
-    let watched = watched(case.mission, network)?;
-    let measured = summary.fleet.connectivity.as_ref()?;
-    let planned = Seen::of(&network.planned)?;
-    let length = Span::from_secs(summary.duration_s);
-    let seen = Seen {
-        length,
-        alpha: measured.alpha,
-        t_0: measured.t_0_s.map(Span::from_secs),
-        dwell: planned.dwell,
-        mean: measured.t_s.map(Span::from_secs),
+    let summary = case.summary.filter(|_| case.mission.vehicles.len() > 1)?;
+    let absences = &summary.fleet.absences;
+    let Some(looked) = looked_for(case.mission, &case.network) else { return Some(of_other_laws(case, absences)) };
+    let Some(seen) = summary.fleet.connectivity.as_ref().and_then(|measured| seen(case.mission, measured, &looked))
+    else {
+        return Some(nothing_seen());
     };
-    let watch = monitor::watch(&watched, &network.graphs, seen);
-    let series = &summary.fleet.coordination.series;
-    let errors: Vec<(f64, f64)> = series.t_s.iter().copied().zip(series.norm.iter().copied()).collect();
-    let judged = watch.judge(&errors, tolerance(case.mission, summary));
+    let broken = looked.broken.iter().cloned().chain(absent(absences)).collect();
+    let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
+    let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
+    let judged = watch.judge(&errors(summary, f64::INFINITY), tolerance);
     Some(TheoryRow {
-        name: "Theorem monitor: the network as measured, the error over time".into(),
-        condition: "a statement covers the fleet, and its errors stay within what it promises".into(),
-        value: margins(&watch),
+        value: format!("{}; {}", network_words(&watch), margins(&watch)),
         holds: Some(matches!(judged, Judgement::Covered { .. })),
-        predicted: watch.envelope.as_ref().map_or("–".into(), |envelope| {
-            format!("‖e(t)‖ ≤ {:.3} e^(−{:.5} t) ‖e(0)‖ ({})", envelope.factor, envelope.rate, envelope.statement)
-        }),
+        predicted: promise(&watch, tolerance),
         guaranteed_rate: watch.envelope.as_ref().map(|envelope| envelope.rate),
-        measured: judged.to_string(),
+        measured: format!("{judged}{}", before_absence(case, &looked).unwrap_or_default()),
+        ..empty()
     })
 }
 
-fn margins(watch: &Watch) -> String {
+/// What is guaranteed for the network as it was: the monitor's envelope, or what other laws' statements promise.
+pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guarantee> {
+    let case = Case::new(mission, Some(summary));
+    let Some(looked) = looked_for(mission, &case.network) else { return guarantee_of(&case) };
+    let seen = seen(mission, summary.fleet.connectivity.as_ref()?, &looked)?;
+    let broken = looked.broken.iter().cloned().chain(absent(&summary.fleet.absences)).collect();
+    let envelope = monitor::watch(&looked.watched, &case.network.graphs, seen, broken).envelope?;
+    Some(Guarantee { rate: envelope.rate, factor: Some(envelope.factor) }).filter(|guarantee| guarantee.rate > 0.0)
+}
+
+/// What theory promises a mission on every switching signal over these graphs with this α, T_0 and dwell time, `length` long.
+///
+/// With it, what messages in periods may cost.
+///
+/// # Errors
+/// Why it promises no envelope.
+pub fn envelope_over(
+    mission: &Mission,
+    graphs: &[Graph],
+    (alpha, t_0, dwell): (f64, Span, Span),
+    length: Span,
+) -> Result<(Envelope, Tolerance), String> {
+    let network = Network::of(mission);
+    let looked = looked_for(mission, &network).ok_or_else(|| {
+        "Theorem 4.4 and Lemma 4.7, which bound errors for such signals, do not speak of this law".to_string()
+    })?;
+    if looked.watched == Watched::Delayed {
+        return Err("Lemmas 4.4 and 4.5, which speak of this law, promise agreement without a rate".to_string());
+    }
+    // No link is up for a shorter time than the dwell time.
+    let period = mission.control_period * mission.message_ticks;
+    let exchange = Exchange {
+        age: age(mission, mission.validity.map_or(length, |validity| period.max(validity))),
+        shortest_up: dwell,
+        unheard: (period.secs() / dwell.secs().max(1e-9)).min(1.0),
+    };
+    let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: None, exchange: Some(exchange) };
+    let watch = monitor::watch(&looked.watched, graphs, seen, looked.broken);
+    let tolerance = tolerance(mission, graphs, &watch, &looked.watched);
+    let envelope = watch.envelope.ok_or_else(|| watch.judge(&[], Tolerance::default()).to_string())?;
+    Ok((envelope, tolerance))
+}
+
+/// A delay that the law was told is not age.
+fn not_told(oldest_s: f64, told: Span) -> Span {
+    Span::from_secs((oldest_s - told.secs()).max(0.0))
+}
+
+fn seen(mission: &Mission, measured: &Connectivity, looked: &Looked) -> Option<Seen> {
+    let length = Span::from_secs(measured.length_s);
+    (length > Span::ZERO).then(|| Seen {
+        length,
+        alpha: measured.alpha,
+        t_0: measured.t_0_s.map(Span::from_secs),
+        dwell: Span::from_secs(measured.dwell_s),
+        mean: measured.t_s.map(Span::from_secs),
+        exchange: Some(Exchange {
+            // Where nothing was heard, nothing is old; the unheard part says it.
+            age: age(mission, not_told(measured.oldest_news_s.unwrap_or(0.0), looked.told))
+                .max(mission.control_period * mission.message_ticks),
+            shortest_up: Span::from_secs(measured.shortest_up_s),
+            unheard: measured.unheard,
+        }),
+    })
+}
+
+fn errors(summary: &Summary, until_s: f64) -> Vec<(f64, f64)> {
+    let series = &summary.fleet.coordination.series;
+    series.t_s.iter().copied().zip(series.norm.iter().copied()).filter(|(t, _)| *t <= until_s).collect()
+}
+
+/// The premise that vehicles which were silent at times do not meet.
+fn absent(absences: &[Absence]) -> Option<Premise> {
+    let words = |absence: &Absence| {
+        format!("{} is silent from {:.1} s to {:.1} s", absence.vehicle, absence.from_s, absence.to_s)
+    };
+    let first = absences.first()?;
+    let more = if absences.len() > 1 { format!(" ({} more times)", absences.len() - 1) } else { String::new() };
+    Some(Premise { asks: PRESENT, found: format!("{}{more}", words(first)) })
+}
+
+/// What can be said of the flight before the first vehicle fell silent.
+fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
+    let summary = case.summary?;
+    let first = summary.fleet.absences.first()?;
+    let seen = seen(case.mission, summary.fleet.connectivity_before.as_ref()?, looked)?;
+    let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, looked.broken.clone());
+    let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
+    let judged = watch.judge(&errors(summary, first.from_s), tolerance);
+    Some(format!("; judged until {:.1} s alone: {judged}", first.from_s))
+}
+
+/// A law that no statement about switching networks speaks of.
+fn of_other_laws(case: &Case<'_>, absences: &[Absence]) -> TheoryRow {
+    let rows = law_rows(case);
+    let spoken: Vec<&TheoryRow> = rows.iter().filter(|row| row.holds.is_some()).collect();
+    let absent = absent(absences);
+    let names = spoken.iter().map(|row| row.name.as_str()).collect::<Vec<_>>().join("; ");
+    let failing: Vec<String> = absent
+        .iter()
+        .map(ToString::to_string)
+        .chain(
+            spoken
+                .iter()
+                .filter(|row| row.holds == Some(false))
+                .map(|row| format!("{} asks for {}, and here: {}", row.name, row.condition, or_nothing(&row.value))),
+        )
+        .collect();
+    let (holds, measured) = match (spoken.is_empty(), failing.is_empty()) {
+        (true, true) => (None, "not covered: no statement speaks of a law without coordination".to_string()),
+        (_, false) => (Some(false), format!("not covered: {}", failing.join("; "))),
+        (false, true) => (Some(true), format!("covered by {names}, without an envelope")),
+    };
+    let value = case.summary.and_then(|summary| summary.fleet.connectivity.as_ref()).map_or("–".into(), measured_words);
+    TheoryRow {
+        value: match names.is_empty() {
+            true => value,
+            false => format!("{value}; Theorems 4.4 and 4.5 do not speak of this law, but this does: {names}"),
+        },
+        holds,
+        guaranteed_rate: None,
+        measured,
+        ..empty()
+    }
+}
+
+fn or_nothing(value: &str) -> &str {
+    if value.is_empty() { "nothing known" } else { value }
+}
+
+fn nothing_seen() -> TheoryRow {
+    TheoryRow { holds: Some(false), measured: "not covered: nothing was recorded".into(), ..empty() }
+}
+
+fn empty() -> TheoryRow {
+    TheoryRow {
+        name: "Theorem monitor: the network as measured, the error over time".into(),
+        condition: "a statement covers the fleet, and its errors stay within what it promises".into(),
+        predicted: "–".into(),
+        ..TheoryRow::default()
+    }
+}
+
+fn promise(watch: &Watch, tolerance: Tolerance) -> String {
+    watch.envelope.as_ref().map_or("–".into(), |envelope| {
+        let rate = envelope.rate * (1.0 - tolerance.slower);
+        let added = if tolerance.added > 0.0 { format!(" and {:.3} more", tolerance.added) } else { String::new() };
+        format!(
+            "‖e(t)‖ ≤ {:.3} e^(−{:.5} t) ‖e(0)‖ ({}); as messages come in periods, {rate:.5} 1/s from {} on{added} will do",
+            envelope.factor, envelope.rate, envelope.statement, Span::from_secs(tolerance.late)
+        )
+    })
+}
+
+fn measured_words(measured: &Connectivity) -> String {
+    let t_0 = measured.t_0_s.map_or("unbounded".to_string(), |t_0| format!("{t_0:.3} s"));
+    let mean = measured.t_s.map_or("not connected in mean".to_string(), |t| format!("T = {t:.3} s"));
+    format!("α = {:.4}, T₀ = {t_0}, dwell time {:.3} s, {mean}", measured.alpha, measured.dwell_s)
+}
+
+/// The network as seen.
+pub(super) fn network_words(watch: &Watch) -> String {
+    let Seen { alpha, t_0, dwell, mean, .. } = watch.seen;
+    let t_0 = t_0.map_or("unbounded".to_string(), |t_0| format!("{:.3} s", t_0.secs()));
+    let mean = mean.map_or("not connected in mean".to_string(), |mean| format!("T = {:.3} s", mean.secs()));
+    format!("α = {alpha:.4}, T₀ = {t_0}, dwell time {:.3} s, {mean}", dwell.secs())
+}
+
+/// Every condition with its value and its limit.
+pub(super) fn margins(watch: &Watch) -> String {
     let words = watch.margins.iter().map(|margin| {
         format!("{}: {} = {:.4}, limit {:.4}", margin.statement, margin.quantity, margin.value, margin.limit)
     });
     words.collect::<Vec<_>>().join("; ")
 }
 
-/// For a fleet under way, the switching signal up to `now`: what theory says so far. The signal is that of the mission,
-/// which the emulator plays; `None` if there is nothing to say yet, or no statement about the mission's law.
-pub fn so_far(mission: &Mission, now: Time) -> Option<String> {
-    let mut flown = mission.clone();
-    flown.end = now.min(mission.end);
-    if flown.end <= Time::ZERO || mission.vehicles.len() < 2 {
-        return None;
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use bus::recording::Recording;
+    use common::record::{Record, Row};
+
+    use super::*;
+    use crate::facts::facts;
+    use crate::results::summarise;
+    use crate::simulate::simulate;
+
+    const BRIEF_LOSSES: &str = include_str!("../../../missions/brief-losses.toml");
+    const HELIX: &str = include_str!("../../../missions/auv-helix.toml");
+    const ONE_LINK: &str = include_str!("../../../missions/thesis/ucm-one-link-at-a-time.toml");
+
+    fn changed(text: &str, changes: &[(&str, &str)]) -> Arc<Mission> {
+        let text = changes.iter().fold(text.to_string(), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replace(from, to)
+        });
+        Arc::new(Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
     }
-    let network = Network::of(&flown);
-    let seen = Seen::of(&network.planned)?;
-    let t_0 = seen.t_0.map_or("unbounded".to_string(), |t_0| t_0.to_string());
-    let mean = seen.mean.map_or("not connected in mean".to_string(), |mean| format!("T = {mean}"));
-    let network_words = format!("network so far: α = {:.4}, T₀ = {t_0}, {mean}", seen.alpha);
-    let Some(watched) = watched(&flown, &network) else { return Some(network_words) };
-    let watch = monitor::watch(&watched, &network.graphs, seen);
-    Some(match (&watch.covered_by, &watch.envelope) {
-        (Some(_), Some(envelope)) => format!(
-            "{network_words}; covered by {}: errors are at most {:.3e} of those at the start",
-            envelope.statement,
-            envelope.at(flown.end.secs())
-        ),
-        (Some(statement), None) => format!("{network_words}; covered by {statement}"),
-        (None, _) => format!("{network_words}; {}", watch.judge(&[], 0.0)),
-    })
+
+    fn flown(mission: &Arc<Mission>) -> Recording {
+        let mut recording = Recording { complete: true, ..Recording::default() };
+        let keep = |row: Row| {
+            if let Row::Exact(record) = row {
+                recording.exact.push(record);
+            }
+        };
+        simulate(mission, keep, |_| true).expect("flies");
+        recording
+    }
+
+    fn judged(mission: &Mission, recording: &Recording) -> (TheoryRow, Option<Guarantee>) {
+        let summary = summarise(recording, &facts(mission));
+        let row = row(&Case::new(mission, Some(&summary))).expect("several vehicles");
+        (row, guarantee_of_flight(mission, &summary))
+    }
+
+    fn verdict(text: &str, changes: &[(&str, &str)]) -> String {
+        let mission = changed(text, changes);
+        let (row, _) = judged(&mission, &flown(&mission));
+        assert_eq!(row.holds, Some(row.measured.starts_with("covered")), "{row:?}");
+        row.measured
+    }
+
+    #[test]
+    fn what_is_covered_is_said_to_be_and_its_envelope_is_that_of_the_measured_network() {
+        let mission = changed(BRIEF_LOSSES, &[]);
+        let (row, guarantee) = judged(&mission, &flown(&mission));
+        assert!(row.measured.starts_with("covered by Theorem 4.4; the error reached"), "{row:?}");
+        assert!(guarantee.is_some_and(|g| (g.rate - 0.025).abs() < 1e-9), "{guarantee:?}");
+        let mission = changed(ONE_LINK, &[("duration_s = 400.0", "duration_s = 100.0")]);
+        let (row, guarantee) = judged(&mission, &flown(&mission));
+        assert!(row.measured.starts_with("covered by Theorem 4.5; the error reached"), "{row:?}");
+        assert!(guarantee.is_some_and(|g| g.rate > 0.004 && g.factor.is_some_and(|factor| factor > 1.0)));
+    }
+
+    #[test]
+    fn the_premise_that_fails_is_named() {
+        let short = ("duration_s = 800.0", "duration_s = 60.0");
+        let delay = (
+            "delay = { constant = { delay_s = 5.0 } }",
+            "delay = { constant = { delay_s = 1.0 } }\nloss = { bernoulli = { probability = 0.5 } }",
+        );
+        let type_1 = ("kind = \"II\"", "kind = \"I\"");
+        for (text, changes, words) in [
+            (HELIX, vec![short, delay], "they take 1.000 s, 0.5000 of them are lost"),
+            (HELIX, vec![short, type_1], "auv1 has dynamics of its own (type I, (4.53))"),
+            (BRIEF_LOSSES, vec![type_1], "Theorem 4.4 (type I): ρ₁/(α₁λ₁) must be below 0.1111"),
+            (
+                BRIEF_LOSSES,
+                vec![("links = [[\"auv1\", \"auv2\"],", "one_way = [[\"auv1\", \"auv2\"]]\nlinks = [")],
+                "one-way links occur",
+            ),
+            (
+                BRIEF_LOSSES,
+                vec![("message_period_s = 0.1", "message_period_s = 5.0"), ("validity_s = 0.3", "validity_s = 10.0")],
+                "unheard part of a link's up time must be below 0.2500, and it is 1.0000",
+            ),
+            (
+                BRIEF_LOSSES,
+                vec![
+                    ("message_period_s = 0.1", "message_period_s = 2.5"),
+                    ("validity_s = 0.3", "validity_s = 5.0"),
+                    ("up_from_s = 7.5, up_for_s = 2.5", "up_from_s = 0.2, up_for_s = 2.0"),
+                ],
+                "age of news [s] must be below 0.5000",
+            ),
+        ] {
+            let verdict = verdict(text, &changes);
+            assert!(verdict.starts_with("not covered: ") && verdict.contains(words), "{words}: {verdict}");
+        }
+    }
+
+    #[test]
+    fn a_silent_vehicle_ends_what_is_covered() {
+        let mission = changed(BRIEF_LOSSES, &[]);
+        let mut recording = flown(&mission);
+        let gone =
+            |row: &Record| matches!(row, Record::State(row) if &*row.vehicle == "auv3" && row.t_ns > 57_000_000_000);
+        recording.exact.retain(|row| !gone(row));
+        let (row, guarantee) = judged(&mission, &recording);
+        assert!(row.measured.contains("auv3 is silent from 57.0 s to 120.0 s"), "{}", row.measured);
+        assert!(row.measured.contains("judged until 57.0 s alone: covered by Theorem 4.4"), "{}", row.measured);
+        assert_eq!((row.holds, guarantee), (Some(false), None));
+    }
+
+    #[test]
+    fn every_mission_with_several_vehicles_has_a_verdict() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../missions");
+        let mut count = 0;
+        for folder in ["", "thesis", "talk"] {
+            for entry in std::fs::read_dir(root.join(folder)).expect("lists") {
+                let path = entry.expect("an entry").path();
+                let text = std::fs::read_to_string(&path).unwrap_or_default();
+                let Ok(mission) = Mission::parse("m.toml", &text) else { continue };
+                if mission.vehicles.len() > 1 {
+                    let (row, _) = judged(&mission, &Recording::default());
+                    assert!(row.measured.starts_with("not covered: "), "{}: {row:?}", path.display());
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 25, "{count}");
+    }
+
+    #[test]
+    fn laws_of_other_chapters_are_spoken_of_by_their_own_propositions() {
+        const SOLUTION: &str = include_str!("../../../missions/thesis/solution-1.toml");
+        let verdict = verdict(SOLUTION, &[]);
+        assert_eq!(verdict, "covered by Proposition 3.4 (solution I), without an envelope");
+    }
 }

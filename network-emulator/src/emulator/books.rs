@@ -16,6 +16,11 @@ impl Emulator {
         self.links.iter().map(|link| &link.ledger)
     }
 
+    /// When a vehicle made its newest message, and the ξ in it.
+    pub fn said(&self, vehicle: usize) -> Option<(Time, f64)> {
+        self.said.get(vehicle).copied().flatten()
+    }
+
     /// Sent, delivered, dropped, in flight, over all links.
     pub fn totals(&self) -> [u64; 4] {
         let add =

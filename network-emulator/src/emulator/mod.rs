@@ -82,6 +82,8 @@ pub struct Emulator {
     under_way: BinaryHeap<Reverse<UnderWay>>,
     /// Number of the newest message taken from each vehicle, to tell a repetition.
     newest: Vec<Option<u32>>,
+    /// When each vehicle made its newest message, and the ξ in it.
+    said: Vec<Option<(Time, f64)>>,
     /// How many messages were taken from each vehicle.
     taken: Vec<u64>,
     /// Where the vehicles are, if it matters.
@@ -119,6 +121,7 @@ impl Emulator {
             next_change: Some(Time::ZERO),
             under_way: BinaryHeap::new(),
             newest: vec![None; n],
+            said: vec![None; n],
             taken: vec![0; n],
             whereabouts: mission.links.iter().any(Link::needs_distance).then(|| Whereabouts::new(places)),
             senders: if shared { mission.vehicles.iter().enumerate().map(sender).collect() } else { Vec::new() },
@@ -169,6 +172,7 @@ impl Emulator {
             return Err(Garbage::Stale);
         }
         self.newest[sent.from] = Some(state.seq);
+        self.said[sent.from] = Some((state.made, state.xi)).filter(|(_, xi)| xi.is_finite());
         if let Some(whereabouts) = &mut self.whereabouts {
             whereabouts.said(sent.from, now, state.made, state.xi);
         }

@@ -50,10 +50,14 @@ impl Hub {
             connected: known.is_some_and(|k| k.connected),
             phase: known.map_or(Phase::Idle, |k| k.phase),
             reason: known.map_or(String::new(), |k| k.reason.clone()),
+            said: None,
         };
         let mission = self.load.as_ref().map(|load| load.mission.clone());
         if let Some(mission) = &mission {
-            vehicles.extend(mission.vehicles.iter().map(|v| status(&v.id, self.vehicles.get(&v.id))));
+            let said = |index: usize| self.load.as_ref().and_then(|load| load.emulator.said(index));
+            let of =
+                |(index, id): (usize, &str)| VehicleStatus { said: said(index), ..status(id, self.vehicles.get(id)) };
+            vehicles.extend(mission.vehicles.iter().map(|v| v.id.as_str()).enumerate().map(of));
         }
         for (id, known) in &self.vehicles {
             if known.connected && mission.as_ref().is_none_or(|m| m.index_of(id).is_none()) {

@@ -1,6 +1,7 @@
 //! The hub as mission-control and the vehicles see it.
 
 use common::mission::digest;
+use common::wire::state::CoordinationState;
 use common::wire::vehicle::FlightPlan;
 
 use super::*;
@@ -269,4 +270,20 @@ fn what_is_known_of_a_flight_that_is_taken_up_is_recorded_again_and_links_were_d
     let said = hello(&mut hub, "auv1", running(vec![command(30.0, 0.2), command(45.0, 0.3)], 0));
     assert!(told(&said, "auv3").contains(&&ToVehicle::Speed(command(45.0, 0.3))), "{said:?}");
     assert!(matches!(recorded(&said)[..], [Record::Speed(row)] if row.speed == 0.3), "{said:?}");
+}
+
+#[test]
+fn the_status_tells_where_vehicles_said_they_are() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let made = Time::from_secs(1.0);
+    let state = CoordinationState { mission: digest(HELIX), sender: 1, seq: 10, made, xi: 71.5, scalar: None };
+    hub.handle(made, Some(HubInput::State(1, state.encode().into())));
+    let answers = ask(&mut hub, Time::from_secs(1.2), ToFleet::Status);
+    let status = answers.into_iter().find_map(|output| match output {
+        HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some(status),
+        _ => None,
+    });
+    let said: Vec<_> = status.expect("an answer").vehicles.into_iter().map(|vehicle| vehicle.said).collect();
+    assert_eq!(said, [None, Some((made, 71.5)), None]);
 }

@@ -1,0 +1,236 @@
+//! The theorem monitor over a fleet under way: the switching signal up to now, and where the vehicles said they are.
+
+use common::mission::Mission;
+use common::theory::monitor::{self, Envelope, Margin, Premise, Seen};
+use common::time::{Span, Time};
+use common::wire::fleet::FleetStatus;
+use serde::Serialize;
+
+use super::network::Network;
+use super::premises::{looked_for, planned_exchange, tolerance};
+use super::watched::{margins, network_words};
+
+/// Whoever was heard longer ago than this many message periods, and a second, has fallen silent.
+const SILENT_PERIODS: i64 = 5;
+
+/// What theory says so far.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SoFar {
+    /// Until when \[s\].
+    pub until_s: f64,
+    /// α, T_0, τ_D and T so far.
+    pub alpha: f64,
+    /// `None` if never connected.
+    pub t_0_s: Option<f64>,
+    /// The shortest time between two changes.
+    pub dwell_s: f64,
+    /// `None` if not connected in mean.
+    pub t_s: Option<f64>,
+    /// Every condition that was looked at.
+    pub margins: Vec<Margin>,
+    /// Premises that are not so.
+    pub broken: Vec<Premise>,
+    /// The statement that covers the fleet.
+    pub covered_by: Option<&'static str>,
+    /// What it promises, if it promises a rate.
+    pub envelope: Option<Envelope>,
+    /// ‖e‖ at the start, and now, from where the vehicles last said they are; `None` if one has said nothing.
+    pub initial_error: f64,
+    /// See there.
+    pub error: Option<f64>,
+    /// What the envelope allows now.
+    pub allowed: Option<f64>,
+    /// All of this in words.
+    pub verdict: String,
+    #[serde(skip)]
+    words: String,
+}
+
+impl std::fmt::Display for SoFar {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.words)
+    }
+}
+
+/// What theory says of a fleet under way. The switching signal is that of the mission, which the emulator plays; `None` if there
+/// is nothing to say yet.
+pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
+    let mut flown = mission.clone();
+    flown.end = status.now.min(mission.end);
+    if flown.end <= Time::ZERO || mission.vehicles.len() < 2 {
+        return None;
+    }
+    let network = Network::of(&flown);
+    let planned = Seen::of(&network.planned)?;
+    let missing = missing(mission, status);
+    let (initial_error, error) = (norm(&at_start(mission)), now(mission, status).map(|now| norm(&now)));
+    let Some(looked) = looked_for(&flown, &network) else {
+        let names = "Theorems 4.4 and 4.5 and Lemma 4.7 do not speak of this law; the report says what does";
+        let verdict = missing.as_ref().map_or(names.to_string(), |premise| format!("not covered: {premise}"));
+        let watch = monitor::Watch {
+            seen: planned,
+            margins: Vec::new(),
+            broken: missing.into_iter().collect(),
+            covered_by: None,
+            envelope: None,
+        };
+        return Some(said(&watch, flown.end, initial_error, error, None, verdict));
+    };
+    let exchange = planned_exchange(&flown, &network);
+    let seen = Seen { exchange: Some(exchange), ..planned };
+    let broken = looked.broken.iter().cloned().chain(missing).collect();
+    let watch = monitor::watch(&looked.watched, &network.graphs, seen, broken);
+    let tolerance = tolerance(mission, &network.graphs, &watch, &looked.watched);
+    let t = flown.end.secs();
+    // Between words, a vehicle is taken to go on at v_L: it strays by what coordination asks of it meanwhile.
+    let mut errors = vec![(0.0, initial_error)];
+    errors.extend(error.map(|error| (t, error)));
+    let allowed = watch.envelope.as_ref().map(|envelope| tolerance.allowed(envelope, initial_error, t));
+    let verdict = match (error, watch.judge(&errors, tolerance)) {
+        (None, monitor::Judgement::Covered { statement, .. }) => {
+            format!("covered by {statement}; not every vehicle has said where it is")
+        }
+        (_, judged) => judged.to_string(),
+    };
+    Some(said(&watch, flown.end, initial_error, error, allowed, verdict))
+}
+
+fn said(
+    watch: &monitor::Watch,
+    until: Time,
+    initial_error: f64,
+    error: Option<f64>,
+    allowed: Option<f64>,
+    verdict: String,
+) -> SoFar {
+    let mut words = format!("network so far: {}", network_words(watch));
+    if !watch.margins.is_empty() {
+        words += &format!("\n{}", margins(watch));
+    }
+    if let Some(error) = error {
+        words += &format!("\ncoordination error ‖e‖ {error:.3e}, at the start {initial_error:.3e}");
+    }
+    if let Some(allowed) = allowed {
+        words += &format!(", at most {allowed:.3e} allowed");
+    }
+    words += &format!("\n{verdict}");
+    let Seen { alpha, t_0, dwell, mean, .. } = watch.seen;
+    SoFar {
+        until_s: until.secs(),
+        alpha,
+        t_0_s: t_0.map(Span::secs),
+        dwell_s: dwell.secs(),
+        t_s: mean.map(Span::secs),
+        margins: watch.margins.clone(),
+        broken: watch.broken.clone(),
+        covered_by: watch.covered_by,
+        envelope: watch.envelope,
+        initial_error,
+        error,
+        allowed,
+        verdict,
+        words,
+    }
+}
+
+/// The premise that a vehicle which is not there does not meet.
+fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
+    let silent = (mission.control_period * (mission.message_ticks * SILENT_PERIODS)).max(Span::from_secs(1.0));
+    let found: Vec<String> = mission
+        .vehicles
+        .iter()
+        .filter_map(|plan| {
+            let of = status.vehicles.iter().find(|vehicle| vehicle.id == plan.id);
+            let last = of.and_then(|of| of.said).map(|(made, _)| made);
+            let since = last.map_or(String::new(), |made| format!(" since {:.1} s", made.secs()));
+            match of {
+                Some(of) if !of.connected => Some(format!("{} is not connected, silent{since}", plan.id)),
+                None => Some(format!("{} is not connected", plan.id)),
+                Some(_) if mission.talk.is_none() && last.is_some_and(|made| status.now - made > silent) => {
+                    Some(format!("{} is silent{since}", plan.id))
+                }
+                Some(_) => None,
+            }
+        })
+        .collect();
+    (!found.is_empty()).then(|| Premise { asks: "every vehicle all the time", found: found.join(", ") })
+}
+
+fn at_start(mission: &Mission) -> Vec<f64> {
+    mission.vehicles.iter().map(|plan| plan.start.xi - plan.pattern.at(Time::ZERO).h).collect()
+}
+
+/// ξ_i − h_i now, from where the vehicles last said they are, advanced at the fleet's speed.
+fn now(mission: &Mission, status: &FleetStatus) -> Option<Vec<f64>> {
+    let speed = status.speed * mission.nominal_factor();
+    let of = |plan: &common::mission::VehiclePlan| {
+        let (made, xi) = status.vehicles.iter().find(|vehicle| vehicle.id == plan.id)?.said?;
+        Some(xi + speed * (status.now - made).secs() - plan.pattern.at(status.now).h)
+    };
+    mission.vehicles.iter().map(of).collect()
+}
+
+fn norm(states: &[f64]) -> f64 {
+    let mean = states.iter().sum::<f64>() / states.len().max(1) as f64;
+    states.iter().map(|x| (x - mean).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use common::wire::fleet::VehicleStatus;
+    use common::wire::vehicle::Phase;
+
+    use super::*;
+
+    const BRIEF_LOSSES: &str = include_str!("../../../missions/brief-losses.toml");
+
+    fn at(t: f64, xi: [f64; 3], connected: [bool; 3]) -> (Mission, FleetStatus) {
+        let mission = Mission::parse("m.toml", BRIEF_LOSSES).unwrap_or_else(|faults| panic!("{faults}"));
+        let now = Time::from_secs(t);
+        let vehicles = mission.vehicles.iter().zip(xi).zip(connected).map(|((plan, xi), connected)| VehicleStatus {
+            id: plan.id.clone(),
+            connected,
+            phase: Phase::Running,
+            reason: String::new(),
+            said: Some((now, xi)),
+        });
+        let status = FleetStatus {
+            phase: Phase::Running,
+            mission: BRIEF_LOSSES.into(),
+            now,
+            end: mission.end,
+            speed: 0.5,
+            vehicles: vehicles.collect(),
+            collected: false,
+            messages: [0; 4],
+        };
+        (mission, status)
+    }
+
+    #[test]
+    fn a_fleet_under_way_is_inside_or_outside_its_envelope() {
+        let (mission, near) = at(60.0, [30.0, 30.1, 30.2], [true; 3]);
+        let so_far = so_far(&mission, &near).expect("time has passed");
+        assert!(so_far.verdict.starts_with("covered by Theorem 4.4"), "{}", so_far.verdict);
+        assert!((so_far.error.expect("all spoke") - 0.02f64.sqrt()).abs() < 1e-9);
+        assert!(so_far.to_string().contains("dwell time 2.500 s") && so_far.margins.len() >= 5, "{so_far}");
+        let (mission, far) = at(60.0, [10.0, 30.0, 90.0], [true; 3]);
+        let so_far = super::so_far(&mission, &far).expect("time has passed");
+        assert!(so_far.verdict.starts_with("a defect"), "{}", so_far.verdict);
+    }
+
+    #[test]
+    fn whoever_is_not_there_is_a_broken_premise() {
+        let (mission, status) = at(60.0, [30.0, 30.1, 30.2], [true, true, false]);
+        let gone = so_far(&mission, &status).expect("time has passed");
+        assert!(gone.covered_by.is_none() && gone.verdict.contains("auv3 is not connected"), "{}", gone.verdict);
+        let (mission, mut status) = at(60.0, [30.0, 30.1, 30.2], [true; 3]);
+        status.vehicles[1].said = Some((Time::from_secs(50.0), 25.0));
+        let silent = so_far(&mission, &status).expect("time has passed");
+        assert!(silent.verdict.contains("auv2 is silent since 50.0 s"), "{}", silent.verdict);
+        status.vehicles[1].said = None;
+        let unknown = so_far(&mission, &status).expect("time has passed");
+        assert!(unknown.error.is_none() && unknown.verdict.contains("not every vehicle"), "{}", unknown.verdict);
+        assert_eq!(so_far(&mission, &FleetStatus { now: Time::ZERO, ..status }), None);
+    }
+}
