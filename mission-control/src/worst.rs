@@ -231,7 +231,7 @@ fn climb(
 /// Rate and factor that Theorem 4.4 gives for every signal that is admitted: for (4.21), targets that move as told, and
 /// messages that are neither late nor lost.
 fn promise(mission: &Mission, signals: &Signals, allowance: &Allowance) -> Option<(f64, f64)> {
-    let LawChoice::Switching(law) = &mission.law_choice else { return None };
+    let LawChoice::Switching(_) = &mission.law_choice else { return None };
     let at_once = mission.every_message_takes(Span::ZERO) && mission.loses_by_switching_only();
     let as_told = mission
         .vehicles
@@ -240,8 +240,7 @@ fn promise(mission: &Mission, signals: &Signals, allowance: &Allowance) -> Optio
     if !(at_once && as_told) {
         return None;
     }
-    let gains = vec![law.gain; mission.vehicles.len()];
-    let coordination = Coordination::new(signals.graphs(), &gains, allowance.alpha)?;
+    let coordination = Coordination::new(signals.graphs(), &mission.gains("gain"), allowance.alpha)?;
     Some((coordination.rate_of_agreement(), coordination.overshoot(allowance.t_0)))
 }
 

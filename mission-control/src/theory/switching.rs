@@ -1,7 +1,7 @@
 //! Coordination over a switching network, (4.21).
 
 use common::mission::Mission;
-use common::mission::file::{FollowingChoice, FollowingType, GainOnly};
+use common::mission::file::{FollowingChoice, FollowingType};
 use common::theory::theorem_4_4::Coordination;
 use common::theory::{Gains, theorem_4_5};
 use common::time::Time;
@@ -10,18 +10,17 @@ use super::{Case, Guarantee};
 use crate::results::TheoryRow;
 
 /// Theorem 4.4 for targets that move as told.
-pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
+pub(super) fn guarantee(case: &Case<'_>) -> Option<Guarantee> {
     if !(case.network.immediate && moves_as_told(case.mission)) {
         return None;
     }
-    let coordination = coordination(case, law)?;
+    let coordination = coordination(case)?;
     let factor = case.network.t_0().map(|t_0| coordination.overshoot(t_0));
     Some(Guarantee { rate: coordination.rate_of_agreement(), factor }).filter(|g| g.rate > 0.0)
 }
 
-fn coordination(case: &Case<'_>, law: &GainOnly) -> Option<Coordination> {
-    let gains = vec![law.gain; case.mission.vehicles.len()];
-    Coordination::new(&case.network.graphs, &gains, case.network.alpha())
+fn coordination(case: &Case<'_>) -> Option<Coordination> {
+    Coordination::new(&case.network.graphs, &case.mission.gains("gain"), case.network.alpha())
 }
 
 /// Whether the virtual targets move at exactly the rate the law asks for (path following of type II, η = 0).
@@ -32,8 +31,8 @@ pub(super) fn moves_as_told(mission: &Mission) -> bool {
         .all(|v| matches!(&v.following, FollowingChoice::Theorem47(gains) if gains.kind == FollowingType::II))
 }
 
-pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
-    let (four, five) = (theorem_4_4(case, law), theorem_4_5(case, law));
+pub(super) fn rows(case: &Case<'_>) -> Vec<TheoryRow> {
+    let (four, five) = (theorem_4_4(case), theorem_4_5(case));
     // One of the two is enough: the one that covers the mission is shown, both if both do.
     match (four.holds, five.holds) {
         (Some(true), Some(true)) => vec![four, five],
@@ -55,16 +54,16 @@ fn obstacles(case: &Case<'_>) -> String {
     obstacles
 }
 
-fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
-    let guarantee = guarantee(case, law);
-    let lambda_m = coordination(case, law).map_or("unknown".to_string(), |c| format!("{:.5}", c.lambda_m));
+fn theorem_4_4(case: &Case<'_>) -> TheoryRow {
+    let guarantee = guarantee(case);
+    let lambda_m = coordination(case).map_or("unknown".to_string(), |c| format!("{:.5}", c.lambda_m));
     TheoryRow {
         name: "Theorem 4.4 (rate of the norm, erratum 4.4)".into(),
         condition: "two-way links, α < 1, no delay, no loss, targets that move as told (type II)".into(),
         value: format!(
             "α = {:.4}, k_m = {:.4} 1/s, λ_m = {lambda_m}{}",
             case.network.alpha(),
-            law.gain,
+            case.mission.gains("gain").into_iter().fold(f64::INFINITY, f64::min),
             obstacles(case)
         ),
         holds: Some(guarantee.is_some()),
@@ -74,12 +73,12 @@ fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
     }
 }
 
-fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
+fn theorem_4_5(case: &Case<'_>) -> TheoryRow {
     let Case { mission, network, .. } = case;
     let immediate = network.immediate && moves_as_told(mission);
     let mean = network.planned.connected_in_mean();
     let dwell = network.planned.dwell().unwrap_or(mission.end - Time::ZERO);
-    let proven = Gains::new(&vec![law.gain; mission.vehicles.len()])
+    let proven = Gains::new(&mission.gains("gain"))
         .zip(mean)
         .filter(|_| network.graph.is_undirected() && immediate)
         .and_then(|(gains, mean)| theorem_4_5::agreement(gains, mean, dwell))

@@ -13,10 +13,9 @@ use crate::results::{Summary, TheoryRow};
 /// What the monitor watches in this mission; `None` if it has no statement about its law, or if a premise that is
 /// not about the switching is missing (other rows say so).
 fn watched(mission: &Mission, network: &Network) -> Option<Watched> {
-    let n = mission.vehicles.len();
     match &mission.law_choice {
-        LawChoice::Switching(law) if network.immediate && moves_as_told(mission) => {
-            Some(Watched::Agreement(vec![law.gain; n]))
+        LawChoice::Switching(_) if network.immediate && moves_as_told(mission) => {
+            Some(Watched::Agreement(mission.gains("gain")))
         }
         LawChoice::AuxiliarySwitching(law) if network.immediate && moves_as_told(mission) => {
             Some(Watched::Dynamic(law.a1, law.a2))
