@@ -8,6 +8,7 @@
 //! | two-way fixed networks | Propositions 3.4, 3.5; (3.41), (3.48), (3.75) | agreement; exact rates, and one for varying R_i proven here | [`proposition_3_4`], [`linear_coordination`] |
 //! | one-way fixed networks | Propositions 3.6, 3.7, (3.73), (3.81), (3.85), (3.93); errata 3.13, 3.15, 3.16 | agreement at the slowest root | [`proposition_3_6`] |
 //! | bounded speeds with saturation | Proposition 3.8, Lemma 6.1, (3.97); erratum 3.14 | Q > 0 | [`proposition_3_8`] |
+//! | disturbed path following | Assumption 4.1, (4.25)–(4.28); erratum 4.5 | \|ζ\| in the end below gains times what disturbs it | [`assumption_4_1`] |
 //! | brief connectivity losses | Theorem 4.4; errata 4.4, 4.6 | V at λ_0 − 2αk_mλ_m or min(λ_1, 2(1 − α)k_mλ_m), norms at half | [`theorem_4_4`] |
 //! | connected in mean | Theorems 4.2, 4.5; erratum 4.7 | agreement, with a rate proven here | [`theorem_4_5`] |
 //! | event-triggered talk | this project; (4.21) with beliefs | ‖γ~‖ in the end below √n‖ΠA‖/λ_2 times the error of a belief | [`event_triggered`] |
@@ -22,6 +23,7 @@
 
 use serde::Serialize;
 
+pub mod assumption_4_1;
 pub mod decoupling_2_37;
 pub mod delay;
 pub mod delay_rate;
