@@ -8,13 +8,22 @@ use std::sync::Arc;
 
 use cpf_common::coordination::auxiliary_4_59::Auxiliary;
 use cpf_common::coordination::decentralised_3_92::{Decentralised, Weighing};
+use cpf_common::coordination::delayed_4_34::Delayed;
+use cpf_common::coordination::delayed_4_42::DelayedAlone;
+use cpf_common::coordination::delayed_4_42_estimating::Estimating;
 use cpf_common::coordination::directed_3_72::Directed;
 use cpf_common::coordination::gateway_2_33::Gateway;
 use cpf_common::coordination::introduction_1_5::Introduction;
+use cpf_common::coordination::known_delay::KnownDelay;
 use cpf_common::coordination::leader_1_5::LeaderIntegral;
+use cpf_common::coordination::leader_follower_2_30::LeaderFollower;
+use cpf_common::coordination::neighbours_2_7::Neighbours;
 use cpf_common::coordination::pattern_3_70::MovingPattern;
+use cpf_common::coordination::prescribed_2_6::{Alone, SquareWave};
 use cpf_common::coordination::recruiting::Gains as Recruits;
 use cpf_common::coordination::solution_1_3_43::SolutionOne;
+use cpf_common::coordination::solution_2_3_44::SolutionTwo;
+use cpf_common::coordination::solution_3_3_45::SolutionThree;
 use cpf_common::coordination::switching_4_21::Switching;
 use cpf_common::coordination::weighted_3_62::Weighted;
 use cpf_common::coordination::{CoordinationLaw, FleetLaw, Neighbour, Own, SpeedReference};
@@ -27,11 +36,11 @@ use cpf_common::following::decoupling_2_14::Decoupling;
 use cpf_common::following::h2_figure_2_4::{Controller, Disturbances as H2Disturbances, design};
 use cpf_common::following::line_of_sight::LineOfSight;
 use cpf_common::following::output_feedback_2_3::OutputFeedback;
-use cpf_common::following::proposition_3_1::{Gains, Proposition31};
+use cpf_common::following::proposition_3_1::{Approach, Bend, Errors, Gains, Motion, Proposition31, Sense, Slip};
 use cpf_common::following::proposition_3_2::Proposition32;
 use cpf_common::following::proposition_3_3::Proposition33;
 use cpf_common::following::state_transformation_2_19::StateTransformation;
-use cpf_common::following::trimming::{Derivative, Placement, TrimmingLaw};
+use cpf_common::following::trimming::{Derivative, Deviation, Placement, TrimmingLaw};
 use cpf_common::path::Path;
 use cpf_common::path::circle::{Circle, Turn};
 use cpf_common::path::closest::closest_parameter;
@@ -50,7 +59,7 @@ static ALLOCATIONS: divan::AllocProfiler = divan::AllocProfiler::system();
 const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
 const NEIGHBOURS: [Neighbour; 2] = [
     Neighbour { vehicle: 1, xi: 0.1, scalar: 0.0, said: 0.1, age: 0.0 },
-    Neighbour { vehicle: 1, xi: -0.1, scalar: 0.01, said: -0.1, age: 0.0 },
+    Neighbour { vehicle: 2, xi: -0.1, scalar: 0.01, said: -0.1, age: 0.0 },
 ];
 
 fn main() {
@@ -100,6 +109,57 @@ fn state_transformation_with_2_33(bencher: divan::Bencher) {
     period_of_learner(bencher, trimming_robot(Box::new(law)), &gateway());
 }
 
+/// A law of chapter 2 alone: what it sees, and one period of its own states.
+#[divan::bench(args = ["decoupling", "decoupling, filtered", "output feedback", "state transformation"])]
+fn one_period_of(bencher: divan::Bencher, law: &str) {
+    let placement = Placement::new(1.0, 0.05).expect("gains");
+    let filtered = Derivative::Filtered { tau: 0.05 };
+    let mut law: Box<dyn TrimmingLaw> = match law {
+        "decoupling" => Box::new(Decoupling::new(placement, Derivative::Exact).expect("a law")),
+        "decoupling, filtered" => Box::new(Decoupling::new(placement, filtered).expect("a law")),
+        "output feedback" => {
+            Box::new(OutputFeedback::new(0.4, 0.5, H2Disturbances::default(), Derivative::Exact).expect("a law"))
+        }
+        _ => Box::new(StateTransformation::new(placement)),
+    };
+    let seen = Deviation { d_e: 0.1, psi_e: 0.2, c_c: 0.5, v: 0.4, v_dot: 0.01, r: 0.2 };
+    bencher.bench_local(|| {
+        law.see(black_box(&seen));
+        law.advance(0.02)
+    });
+}
+
+/// Propositions 3.1 to 3.3 alone.
+#[divan::bench(args = ["3.1", "3.1 with Appendix 6.1", "3.2", "3.3"])]
+fn one_steering_of(bencher: divan::Bencher, law: &str) {
+    let e = Errors { x_e: 0.1, y_e: -0.3, psi_e: 0.2 };
+    let slip = Slip { beta_dot: 0.01, beta_ddot: 0.001 };
+    let (motion, bend) = (Motion { v: 0.4, v_dot: 0.01, r: 0.2, slip }, Bend { c_c: 0.5, dc_ds: 0.1 });
+    let of_6_1 = Gains { approach: Approach::Arctangent { psi_a: 1.0, length: 1.0 }, ..Gains::default() };
+    match law {
+        "3.2" => {
+            let law = Proposition32::new(Gains::default()).expect("gains");
+            bencher.bench_local(|| law.steer(black_box(&e), &motion, &bend, Sense::Forward));
+        }
+        "3.3" => {
+            let law = Proposition33::new(Gains::default(), 1.0).expect("gains");
+            bencher.bench_local(|| law.steer(black_box(&e), &motion, &bend, Sense::Forward));
+        }
+        name => {
+            let gains = if name == "3.1" { Gains::default() } else { of_6_1 };
+            let law = Proposition31::new(gains).expect("gains");
+            bencher.bench_local(|| law.steer(black_box(&e), &motion, &bend, Sense::Forward));
+        }
+    }
+}
+
+/// The line of sight of section 1.2 alone.
+#[divan::bench]
+fn one_heading_of_1_4(bencher: divan::Bencher) {
+    let law = LineOfSight::new(1.0).expect("a distance");
+    bencher.bench_local(|| law.heading(black_box(0.3), 0.5));
+}
+
 /// Done once per change of curvature; this one allocates.
 #[divan::bench]
 fn h_2_design() -> Controller {
@@ -141,17 +201,43 @@ fn robot_with_4_21(bencher: divan::Bencher) {
     period(bencher, robot(SpeedLoop::Rate { k_0: 2.0 }), Switching::new(0.1).expect("a gain"));
 }
 
-/// The laws that differ from vehicle to vehicle or have states: one demand, one period of their own states, one word.
-#[divan::bench(args = ["1.5 leader", "3.62", "3.70", "3.72", "3.92", "4.59", "4.62"])]
+/// Every coordination law, of a vehicle with two neighbours: one demand, one period of its own states, one word.
+#[divan::bench(args = [
+    "1.5", "1.5 leader", "2.30 leader", "2.31 follower", "2.33 gateway", "2.34 other", "2.5.3 gateway", "2.5.3 other",
+    "2.7-3 in a row", "2.30 alone", "2.6 square wave", "3.43", "3.44", "3.45", "3.62", "3.70", "3.72", "3.92 told",
+    "3.92 other", "4.21", "4.34", "4.42", "4.42 estimating", "known delay", "4.59", "4.62",
+])]
 fn one_row_of(bencher: divan::Bencher, law: &str) {
+    let recruits = Recruits { a: 3.0, b: 3.0, c: 1.0 };
+    let more = Recruits { a: 4.0, b: 6.0, c: 4.0 };
     let law: Box<dyn FleetLaw> = match law {
+        "1.5" => Box::new(Introduction::new(0.2).expect("a gain")),
         "1.5 leader" => Box::new(LeaderIntegral::new(1, 0.2, 0.04).expect("gains")),
-        "3.62" => Box::new(Weighted::new(1.0, 1.0, 2, &[(0, 1, 2.0)]).expect("gains")),
+        "2.30 leader" => Box::new(LeaderFollower::new(0, 1.0, recruits).expect("gains")),
+        "2.31 follower" => Box::new(LeaderFollower::new(1, 1.0, recruits).expect("gains")),
+        "2.33 gateway" => Box::new(gateway()),
+        "2.34 other" => Box::new(Gateway::new(1, 5.0, recruits).expect("gains")),
+        "2.5.3 gateway" => Box::new(Gateway::with_integral(0, 5.0, more, 1.0).expect("gains")),
+        "2.5.3 other" => Box::new(Gateway::with_integral(1, 5.0, more, 1.0).expect("gains")),
+        "2.7-3 in a row" => Box::new(Neighbours::new(1, 5.0, recruits).expect("gains")),
+        "2.30 alone" => Box::new(Alone::new(1.0).expect("a gain")),
+        "2.6 square wave" => Box::new(SquareWave::new(0.1, 10.0).expect("a wave")),
+        "3.43" => Box::new(SolutionOne::new(1.0).expect("a gain")),
+        "3.44" => Box::new(SolutionTwo::new(1.0, 1.0).expect("gains")),
+        "3.45" => Box::new(SolutionThree::new(1.0, 0.25, 1.0).expect("gains")),
+        "4.21" => Box::new(Switching::new(0.1).expect("a gain")),
+        "4.34" => Box::new(Delayed::new(0.1).expect("a gain")),
+        "4.42" => Box::new(DelayedAlone::new(0.1, 5.0).expect("gains")),
+        "4.42 estimating" => Box::new(Estimating::new(0.1, 10.0).expect("gains")),
+        "known delay" => Box::new(KnownDelay::new(0.1, 10.0).expect("gains")),
+        "3.62" => Box::new(Weighted::new(1.0, 1.0, 3, &[(0, 1, 2.0)]).expect("gains")),
         "3.70" => Box::new(MovingPattern::new(1.0, 0.25, 1.0).expect("gains")),
         "3.72" => Box::new(Directed::new(2.0, 1.0).expect("gains")),
-        "3.92" => Box::new(Decentralised::new(0, 1.0, 1.0, Weighing::Normalised).expect("gains")),
+        "3.92 told" => Box::new(Decentralised::new(0, 1.0, 1.0, Weighing::Normalised).expect("gains")),
+        "3.92 other" => Box::new(Decentralised::new(1, 1.0, 1.0, Weighing::Normalised).expect("gains")),
         "4.59" => Box::new(Auxiliary::fixed(10.0, 16.0).expect("gains")),
-        _ => Box::new(Auxiliary::switching(10.0, 16.0).expect("gains")),
+        "4.62" => Box::new(Auxiliary::switching(10.0, 16.0).expect("gains")),
+        _ => return,
     };
     let mut vehicle = law.vehicle(0);
     let own = Own { xi: 0.3, eta: 0.1, r: 2.0, v: 0.3, h_dot: 0.1, alpha_2: 0.1, ..Own::default() };

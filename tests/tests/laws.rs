@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use bus::recording::Recording;
+use common::graph::Graph;
 use common::mission::Mission;
 use common::record::Row;
+use common::theory::theorem_4_4::Coordination;
 use common::time::Time;
 use cpf_tests::{assert_close, mission, mission_text, state_at, with};
 use mission_control::facts::facts;
@@ -84,7 +86,7 @@ impl Flown {
     /// Whether the messages hold one more scalar beside ξ: those of solution II hold ξ alone.
     fn says_a_scalar(&self) -> bool {
         let least = mission(&mission_text("missions/thesis/solution-2.toml")).message_bytes(0);
-        assert_eq!(self.mission.law.says().is_some(), self.mission.message_bytes(0) > least);
+        assert_eq!(self.mission.law.says(0).is_some(), self.mission.message_bytes(0) > least);
         assert!(self.mission.message_bytes(0) <= least + 8, "{} bytes", self.mission.message_bytes(0));
         self.mission.message_bytes(0) > least
     }
@@ -111,6 +113,47 @@ fn solutions_1_and_2_and_weights_bring_the_same_fleet_together() {
         assert_eq!(flown.says_a_scalar(), scalar, "{name}");
         assert_eq!(flown.theory("Proposition 3.4").holds, Some(true), "{name}");
     }
+}
+
+/// A mission with these gains for its vehicles, in their order; those that are left over have none of their own.
+fn with_gains(path: &str, gains: &[&str]) -> String {
+    let text = mission_text(path);
+    let (head, vehicles) = text.split_once("[[vehicles]]\n").expect("vehicles");
+    let tables = vehicles.split("[[vehicles]]\n").enumerate();
+    let with_own = tables.map(|(i, table)| match gains.get(i) {
+        Some(own) => format!("[[vehicles]]\ngains = {own}\n{table}"),
+        None => format!("[[vehicles]]\n{table}"),
+    });
+    format!("{head}{}", with_own.collect::<String>())
+}
+
+#[test]
+fn vehicles_with_gains_of_their_own_agree_as_theory_says() {
+    // (4.21) with K = diag(0.3, 0.1, 0.1): Theorem 4.4 has k_m and λ_m of this K.
+    let flown = Flown::from(&with_gains("missions/brief-losses.toml", &["{ gain = 0.3 }"]));
+    let row = flown.theory("Theorem 4.4");
+    let up = Graph::from_edges(3, &[(0, 1), (1, 2)]);
+    let promised = Coordination::new(&[up, Graph::empty(3)], &[0.3, 0.1, 0.1], 0.75).expect("a promise");
+    let (rate, fitted) = (row.guaranteed_rate.expect("a rate"), flown.fitted());
+    assert!(row.holds == Some(true) && (rate - promised.rate_of_agreement()).abs() < 1e-12, "{row:?}");
+    let equal = Flown::from(&mission_text("missions/brief-losses.toml"));
+    assert!(fitted > rate && fitted > 1.2 * equal.fitted(), "{fitted} {rate} {}", equal.fitted());
+    assert_eq!(flown.theory("Theorem monitor").holds, Some(true));
+    // (1.5): the rate is a_1 + a_2.
+    let flown = Flown::from(&with_gains("missions/thesis/fig-1-9.toml", &["{ gain = 0.1 }"]));
+    let equal = Flown::from(&mission_text("missions/thesis/fig-1-9.toml"));
+    let [rate, of_equal] = [&flown, &equal].map(|run| run.theory("Lemma 1.1").guaranteed_rate.expect("a rate"));
+    assert!((rate - 0.1 - 0.5 * of_equal).abs() < 1e-12, "{rate} {of_equal}");
+    // Propositions 3.4 and 3.5 with unequal A and B: agreement, and no rate.
+    for (name, own) in [("solution-1", "{ a = 1.6 }"), ("solution-2", "{ a = 1.5, b = 2.0 }")] {
+        let flown = Flown::from(&with_gains(&format!("missions/thesis/{name}.toml"), &[own]));
+        flown.assert_arrived(1e-3, 1e-3, 0.1);
+        let row = flown.theory("Proposition 3.4");
+        assert_eq!((row.holds, row.guaranteed_rate), (Some(true), None), "{row:?}");
+    }
+    // Over one-way links nothing is promised for them.
+    let flown = Flown::from(&with_gains("missions/thesis/eq-3-83.toml", &["{ a = 2.5 }"]));
+    assert_eq!(flown.theory("Agreement (").holds, Some(false));
 }
 
 #[test]

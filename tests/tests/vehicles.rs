@@ -43,6 +43,47 @@ fn proposition_3_3_brings_marine_vehicles_to_their_circles_whatever_their_side_s
 }
 
 #[test]
+fn the_approach_of_appendix_6_1_and_the_sense_of_the_wanted_speed_are_the_missions_choice() {
+    let robots = mission_text("missions/thesis/prop-3-2.toml");
+    let marine = mission_text("missions/thesis/prop-3-3.toml");
+    let flat = "approach = { arctangent = { psi_a_deg = 40.0 } }";
+    for (text, id, old, new) in [
+        (&robots, "r1", "proposition32 = {}", format!("proposition32 = {{ {flat} }}")),
+        (&robots, "r1", "proposition32 = {}", format!("proposition31 = {{ {flat}, sense_of = \"desired_speed\" }}")),
+        (&marine, "m2", "slip_deg = 20.0", format!("slip_deg = 20.0, {flat}")),
+    ] {
+        let (recording, summary) = fly(&with(text, old, &new));
+        assert!(summary.fleet.path_error_final_m < 1e-2, "{new}: {}", summary.fleet.path_error_final_m);
+        assert!(summary.fleet.coordination.last < 1e-3, "{new}: {}", summary.fleet.coordination.last);
+        let (printed, _) = fly(text);
+        let [at, other] = [&recording, &printed].map(|run| state_at(&run.exact, id, 2.0).psi_e_rad);
+        assert!((at - other).abs() > 1e-3, "{new}: the approach is another one");
+    }
+    // Going backwards at the start, by the wanted speed it counts as going forward: it swings further out.
+    let backwards = with(&robots, "yaw_deg = 90.0, speed_mps = 0.2", "yaw_deg = 90.0, speed_mps = -0.4");
+    let desired = with(&backwards, "proposition32 = {}", "proposition32 = { sense_of = \"desired_speed\" }");
+    let [actual, desired] = [backwards, desired].map(|text| {
+        let (recording, summary) = fly(&text);
+        assert!(summary.fleet.path_error_final_m < 1e-2, "{}", summary.fleet.path_error_final_m);
+        state_at(&recording.exact, "r1", 1.0).yaw_rad
+    });
+    assert!((actual - desired).abs() > 1e-3, "{actual} {desired}");
+}
+
+#[test]
+fn a_robot_whose_speed_is_stuck_keeps_to_its_circle() {
+    let stuck =
+        "\nfailure = { speed_stuck = { speed_mps = 0.25, from_s = 20.0, to_s = 60.0 } }\n\n[[vehicles]]\nid = \"r2\"";
+    let text = with(&mission_text("missions/thesis/solution-1.toml"), "\n[[vehicles]]\nid = \"r2\"", stuck);
+    let (recording, _) = fly(&text);
+    for t_s in 15..60 {
+        let row = state_at(&recording.exact, "r1", f64::from(t_s));
+        assert!(row.e_cross_m.abs() < 0.02, "{t_s} s: {} m", row.e_cross_m);
+    }
+    assert_eq!(state_at(&recording.exact, "r1", 40.0).speed_mps, 0.25);
+}
+
+#[test]
 fn a_survey_along_geojson_lanes_is_flown_abreast() {
     let (recording, summary) = fly(&mission_text("missions/waypoints.toml"));
     assert!(summary.fleet.coordination.last < 0.05, "{}", summary.fleet.coordination.last);

@@ -34,7 +34,7 @@ impl FleetLaw for Auxiliary {
         DemandKind::Rate
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn only_the_coordination_state_is_on_the_air_and_nonsense_does_no_harm() {
         for law in [Auxiliary::fixed(1.0, 1.0).unwrap(), Auxiliary::switching(1.0, 1.0).unwrap()] {
-            assert!(law.says().is_none() && law.vehicle(0).says(&Own::default()).is_none());
+            assert!(law.says(0).is_none() && law.vehicle(0).says(&Own::default()).is_none());
             let strange = [Neighbour { xi: f64::NAN, ..Neighbour::default() }];
             let own = Own { alpha_2: f64::NAN, ..Own::default() };
             let mut one = law.vehicle(0);

@@ -40,7 +40,7 @@ impl FleetLaw for Decentralised {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         Some("normalised forward speed v/R [units of ξ per s]")
     }
 
@@ -271,7 +271,7 @@ mod tests {
         for heard in [&[][..], &strange] {
             assert_eq!(demand_of(law.vehicle(1).as_mut(), SpeedReference::default(), &own, heard), 0.0);
         }
-        assert!(FleetLaw::says(&law).is_some() && law.vehicle(1).says(&own) == Some(0.5));
+        assert!(FleetLaw::says(&law, 0).is_some() && law.vehicle(1).says(&own) == Some(0.5));
         assert!(Decentralised::new(0, 0.0, 1.0, Weighing::Plain).is_err());
     }
 }

@@ -35,7 +35,7 @@ impl FleetLaw for Estimating {
         DemandKind::Rate
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 

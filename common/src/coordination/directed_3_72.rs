@@ -150,7 +150,7 @@ mod tests {
     fn it_is_sane() {
         let law = Directed::new(1.0, 1.0).unwrap();
         assert_sane(&law);
-        assert!(FleetLaw::says(&law).is_none() && law.vehicle(0).says(&Own::default()).is_none());
+        assert!(FleetLaw::says(&law, 0).is_none() && law.vehicle(0).says(&Own::default()).is_none());
         assert!(Directed::new(1.0, 0.0).is_err() && Directed::new(f64::INFINITY, 1.0).is_err());
     }
 }

@@ -8,7 +8,8 @@ use crate::positive::positive;
 /// v_1^c = R_1 v_L.
 ///
 /// The modes are those of (2.35): they decay if ab > c, for every b_0 > 0. A vehicle that is stuck at v_0 is waited for by
-/// all others, and stays b_0/c (v_0/R_2 − v_1^c/R_1) ahead of them (2.43); with the extra integrator it does not.
+/// all others, and stays b_0/c (v_0/R_2 − v_1^c/R_1) ahead of them (2.43); with the extra integrator it does not, if d is
+/// small enough for the number of vehicles ([`greatest_d`](crate::theory::gateway_2_35::Gateway::greatest_d)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gateway {
     gateway: usize,
@@ -41,17 +42,20 @@ impl FleetLaw for Gateway {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
-        self.d.map(|_| "integral of how far the gateway is ahead, δe [units of ξ times s]")
+    /// The gateway itself says ξ alone: nobody minds how far it is ahead of itself.
+    fn says(&self, vehicle: usize) -> Option<&'static str> {
+        let says = self.d.is_some() && vehicle != self.gateway;
+        says.then_some("integral of how far the gateway is ahead, δe [units of ξ times s]")
     }
 
     fn vehicle(&self, index: usize) -> Box<dyn VehicleLaw> {
-        let (d, says) = (self.d.unwrap_or(0.0), self.d.is_some());
+        let d = self.d.unwrap_or(0.0);
         if index == self.gateway {
             let recruit = Recruit::new(self.gains, Some(self.b_0), d);
-            Box::new(Hub { gateway: index, recruit, integrals: 0.0, says })
+            Box::new(Hub { gateway: index, recruit, integrals: 0.0 })
         } else {
-            Box::new(Spoke { gateway: self.gateway, recruit: Recruit::new(self.gains, None, d), says })
+            let recruit = Recruit::new(self.gains, None, d);
+            Box::new(Spoke { gateway: self.gateway, recruit, says: self.d.is_some() })
         }
     }
 }
@@ -63,7 +67,6 @@ struct Hub {
     recruit: Recruit,
     /// Σ δe_{1,i} of those heard.
     integrals: f64,
-    says: bool,
 }
 
 impl VehicleLaw for Hub {
@@ -82,11 +85,6 @@ impl VehicleLaw for Hub {
 
     fn neighbour_rate(&self, _: SpeedReference, _: f64) -> f64 {
         self.recruit.rate()
-    }
-
-    /// Nothing anybody needs.
-    fn says(&self, _: &Own) -> Option<f64> {
-        self.says.then_some(0.0)
     }
 }
 
@@ -129,6 +127,8 @@ mod tests {
     use crate::coordination::sampled_fleet::SampledFleet;
     use crate::coordination::{Demand, FleetLaw, Neighbour, Own, SpeedReference};
     use crate::graph::Graph;
+    use crate::theory::gateway_2_35::Gateway as Theory;
+    use crate::theory::polynomial::abscissa;
 
     const GAINS: Gains = Gains { a: 3.0, b: 3.0, c: 1.0 };
     const MORE: Gains = Gains { a: 4.0, b: 6.0, c: 4.0 };
@@ -200,7 +200,7 @@ mod tests {
         spoke.demand(reference, &own, &[Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }]);
         spoke.advance(0.1);
         assert!((spoke.says(&own).unwrap() - 0.05).abs() < 1e-15, "δe grows while the gateway is ahead");
-        assert_eq!((hub.says(&own), law.says().is_some()), (Some(0.0), true));
+        assert_eq!((hub.says(&own), law.says(0).is_some(), law.says(2).is_some()), (None, false, true));
         assert!(Gateway::new(0, 5.0, GAINS).unwrap().vehicle(1).says(&own).is_none());
     }
 
@@ -214,17 +214,97 @@ mod tests {
         assert!(Gateway::with_integral(0, 5.0, MORE, 0.0).is_err());
     }
 
+    /// The fleet as theory has it.
+    fn in_theory(gains: Gains, d: Option<f64>, b_0: f64, n: usize) -> Theory {
+        Theory { a: gains.a, distance: [gains.b, gains.c].into_iter().chain(d).collect(), b_0, n }
+    }
+
+    /// Vehicles with these radii, the second stuck at 0.8 of the formation speed, after `seconds`; and the greatest spread in
+    /// the second half of that time.
+    fn with_a_stuck_one(law: &Gateway, r: &[f64], seconds: f64) -> (SampledFleet, f64) {
+        let (n, dt) = (r.len(), 0.01);
+        let mut fleet = SampledFleet::new(law, &star(n), &vec![0.0; n]).with_v_l(0.1).with_r(r);
+        let (steps, mut most) = ((seconds / dt) as usize, 0f64);
+        for step in 0..steps {
+            let xi = fleet.xi[1];
+            fleet.v[1] = 0.08 * r[1];
+            fleet.run(dt, dt);
+            fleet.xi[1] = xi + 0.08 * dt;
+            if step > steps / 2 {
+                most = most.max(fleet.spread());
+            }
+        }
+        (fleet, most)
+    }
+
+    /// a, b, and c as a part of ab.
+    fn gains(range: std::ops::Range<f64>) -> impl Strategy<Value = Gains> {
+        (1.0..4.0f64, 1.0..4.0f64, range).prop_map(|(a, b, part)| Gains { a, b, c: part * a * b })
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(16))]
 
         /// (2.35) decays for every b_0 and any number of vehicles if ab > c.
         #[test]
-        fn it_agrees_whatever_b_0_and_the_radii(b_0 in 1.0..10.0f64, n in 2usize..6, xi in prop::array::uniform5(-0.5..0.5f64),
-                                                r in prop::array::uniform5(0.5..5.0f64)) {
-            let law = Gateway::new(0, b_0, GAINS).unwrap();
+        fn it_agrees_whatever_b_0_and_the_radii_if_ab_is_above_c(
+            gains in gains(0.1..0.7), b_0 in 0.5..10.0f64, n in 2usize..6, xi in prop::array::uniform5(-0.5..0.5f64),
+            r in prop::array::uniform5(0.5..5.0f64),
+        ) {
+            let law = Gateway::new(0, b_0, gains).unwrap();
+            let rate = in_theory(gains, None, b_0, n).verdict(false).norm_rate.expect("it decays");
+            prop_assume!(rate > 0.05);
             let mut fleet = SampledFleet::new(&law, &star(n), &xi[..n]).with_v_l(0.1).with_r(&r[..n]);
-            fleet.run(300.0, 0.02);
+            fleet.run(16.0 / rate, 0.005);
             prop_assert!(fleet.spread() < 1e-3, "{:?}", fleet.xi);
+        }
+
+        #[test]
+        fn it_does_not_if_c_is_above_ab(
+            gains in gains(1.5..3.0), b_0 in 0.5..10.0f64, n in 3usize..6, r in prop::array::uniform5(0.5..5.0f64),
+        ) {
+            prop_assert!(Gateway::new(0, b_0, gains).is_err());
+            let law = Gateway { gateway: 0, b_0, gains, d: None };
+            let slowest = abscissa(&in_theory(gains, None, b_0, n).follower()).expect("a polynomial");
+            // Two of the others are apart.
+            let mut fleet = SampledFleet::new(&law, &star(n), &vec![0.0; n]).with_v_l(0.1).with_r(&r[..n]);
+            fleet.xi[2] = 0.1;
+            fleet.run(8.0 / slowest, 0.005);
+            prop_assert!(fleet.spread() > 1.0, "{:?}", fleet.xi);
+        }
+
+        /// Section 2.5.3: no error stays, whatever b_0, if d is below what the number of vehicles allows.
+        #[test]
+        fn with_the_extra_integrator_a_stuck_vehicle_leaves_no_error(
+            gains in gains(0.1..0.6), of_d in 0.3..0.8f64, b_0 in 0.2..8.0f64, n in 2usize..6,
+            r in prop::array::uniform5(0.5..5.0f64),
+        ) {
+            let d = of_d * in_theory(gains, Some(0.0), b_0, n).greatest_d().expect("with the integrator");
+            let theory = in_theory(gains, Some(d), b_0, n);
+            let rate = theory.verdict(true).norm_rate.expect("it decays");
+            prop_assume!(rate > 0.04);
+            let (fleet, _) = with_a_stuck_one(&Gateway::with_integral(0, b_0, gains, d).unwrap(), &r[..n], 20.0 / rate);
+            prop_assert!(fleet.spread() < 1e-4 && theory.steady_error(0.08 * r[1], r[1], 0.1 * r[0], r[0]) == 0.0, "{:?}", fleet.xi);
+            prop_assert!(fleet.rate.iter().skip(2).all(|rate| (rate - 0.08).abs() < 1e-4), "{:?}", fleet.rate);
+            // Without it one stays, that of (2.43).
+            let plain = in_theory(gains, None, b_0, n);
+            let rate = plain.verdict(true).norm_rate.expect("it decays");
+            prop_assume!(rate > 0.04);
+            let (fleet, _) = with_a_stuck_one(&Gateway::new(0, b_0, gains).unwrap(), &r[..n], 20.0 / rate);
+            let stays = plain.steady_error(0.08 * r[1], r[1], 0.1 * r[0], r[0]);
+            prop_assert!((fleet.xi[1] - fleet.xi[0] - stays).abs() < 1e-3 * (1.0 + stays.abs()), "{:?} {}", fleet.xi, stays);
+        }
+
+        #[test]
+        fn and_with_a_larger_d_a_stuck_vehicle_upsets_the_others(b_0 in 0.1..0.5f64, n in 7usize..9) {
+            // The gains of section 2.5.3: d = 1 will do for five vehicles.
+            let theory = in_theory(MORE, Some(1.0), b_0, n);
+            let slowest = abscissa(&theory.with_failure()).expect("a polynomial");
+            prop_assert!(theory.greatest_d() < Some(1.0) && slowest > 0.0, "{}", slowest);
+            let law = Gateway::with_integral(0, b_0, MORE, 1.0).unwrap();
+            let most_of = |seconds: f64| with_a_stuck_one(&law, &vec![1.0; n], seconds).1;
+            let (soon, late) = (most_of(4.0 / slowest), most_of(9.0 / slowest));
+            prop_assert!(late > 10.0 * soon, "{} {}", soon, late);
         }
     }
 }

@@ -32,7 +32,7 @@ impl FleetLaw for KnownDelay {
         DemandKind::Rate
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 

@@ -26,7 +26,7 @@ impl FleetLaw for LeaderIntegral {
         DemandKind::Rate
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn only_the_position_is_on_the_air() {
         let law = LeaderIntegral::new(0, 0.2, 0.04).unwrap();
-        assert!(law.says().is_none() && law.vehicle(1).says(&Own::default()).is_none());
+        assert!(law.says(0).is_none() && law.vehicle(1).says(&Own::default()).is_none());
         assert!(LeaderIntegral::new(0, 0.2, 0.0).is_err() && LeaderIntegral::new(0, -0.2, 0.1).is_err());
     }
 }

@@ -28,7 +28,7 @@ impl FleetLaw for LeaderFollower {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 
@@ -175,7 +175,7 @@ mod tests {
         // ζ has fallen by R c s̄ dt: the demand rises by as much.
         let Demand::Forward(next) = follower.demand(reference, &own, &ahead) else { panic!() };
         assert!((next - 1.5 - 2.0 * 0.25 * 0.1).abs() < 1e-15);
-        assert!(law.says().is_none() && follower.says(&own).is_none());
+        assert!(law.says(0).is_none() && follower.says(&own).is_none());
     }
 
     #[test]

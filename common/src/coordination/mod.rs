@@ -6,7 +6,7 @@
 //! | two vehicles, one of which learns v_L | section 1.2 | ẋ_2 = −a_2 (x_2 − x_1) + b_2 e_I, after (1.5) | rate | ξ_j | [`leader_1_5`] |
 //! | leader and followers | section 2.2.1 | F_1 = −a_1(v_1 − v_1^c) (2.30), followers (2.31) | forward acceleration | ξ_1 | [`leader_follower_2_30`] |
 //! | gateway | section 2.2.2, erratum 2.2 | (2.33), (2.34) | forward acceleration | ξ_1, or all ξ_i | [`gateway_2_33`] |
-//! | gateway with the extra integrator | section 2.5.3, errata 2.2, 2.12 | (2.33), (2.34) with δe_{1,i} | forward acceleration | the same, δe_{1,i} | [`gateway_2_33`] |
+//! | gateway with the extra integrator | section 2.5.3, errata 2.2, 2.12 | (2.33), (2.34) with δe_{1,i} | forward acceleration | ξ_1, or all ξ_i and δe_{1,i} | [`gateway_2_33`] |
 //! | neighbours in a row | Figure 2.7-3, a law of our own | (2.33) for any vehicle | forward acceleration | ξ_{i±1} | [`neighbours_2_7`] |
 //! | alone | (2.30) for every vehicle | F_i = −a_1(v_i − R_i v_L) | forward acceleration | nothing | [`prescribed_2_6`] |
 //! | square wave | Figure 2.6 | F_i/m = ±amplitude | forward acceleration | nothing | [`prescribed_2_6`] |
@@ -27,6 +27,7 @@
 //! | delay, not told | this project; after Lemma 4.5 | (4.42) with v_L* estimated on board | rate | γ_j | [`delayed_4_42_estimating`] |
 //! | delay, known | this project | v_r = v_L − kΣ(γ_i(t−τ_ij) − γ_j(t−τ_ij)) | rate | γ_j and its age | [`known_delay`] |
 //!
+//! Vehicles with gains of their own have their rows from [`diagonal`].
 //! What all of them need of the neighbours is in [`disagreement`], what the laws of chapter 2 share in [`recruiting`].
 
 pub mod auxiliary_4_59;
@@ -34,6 +35,7 @@ pub mod decentralised_3_92;
 pub mod delayed_4_34;
 pub mod delayed_4_42;
 pub mod delayed_4_42_estimating;
+pub mod diagonal;
 pub mod directed_3_72;
 pub mod disagreement;
 pub mod gateway_2_33;
@@ -138,8 +140,8 @@ pub trait CoordinationLaw: Send + Sync + std::fmt::Debug {
 pub trait FleetLaw: Send + Sync + std::fmt::Debug {
     /// The kind of demand it gives.
     fn kind(&self) -> DemandKind;
-    /// What is sent beside ξ, in words and with its unit; `None` if ξ is all.
-    fn says(&self) -> Option<&'static str>;
+    /// What the vehicle with this index sends beside ξ, in words and with its unit; `None` if ξ is all.
+    fn says(&self, vehicle: usize) -> Option<&'static str>;
     /// The law of the vehicle with this index in the mission.
     fn vehicle(&self, index: usize) -> Box<dyn VehicleLaw>;
 }
@@ -158,7 +160,8 @@ pub trait VehicleLaw: Send + std::fmt::Debug {
         let _ = scalar;
         reference.v_l
     }
-    /// The one more scalar that goes on the air beside ξ. Always `Some` if [`FleetLaw::says`] is, else always `None`.
+    /// The one more scalar that goes on the air beside ξ. Always `Some` if [`FleetLaw::says`] is for this vehicle, else
+    /// always `None`.
     fn says(&self, own: &Own) -> Option<f64> {
         let _ = own;
         None
@@ -170,7 +173,7 @@ impl<L: CoordinationLaw + Clone + 'static> FleetLaw for L {
         CoordinationLaw::kind(self)
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         self.needs_speed_error().then_some("normalised speed-tracking error η/R [units of ξ per s]")
     }
 

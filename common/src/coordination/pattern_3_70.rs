@@ -24,7 +24,7 @@ impl FleetLaw for MovingPattern {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         Some("normalised speed-tracking error about the pattern η/R − h' [units of ξ per s]")
     }
 
@@ -137,6 +137,6 @@ mod tests {
         let own = Own { h_dot: 0.1, ..Own::default() };
         assert!(demand_of(law.vehicle(0).as_mut(), SpeedReference::default(), &own, &strange).is_finite());
         assert!(law.vehicle(0).says(&own).is_some_and(f64::is_finite));
-        assert!(FleetLaw::says(&law).is_some() && MovingPattern::new(1.0, -1.0, 1.0).is_err());
+        assert!(FleetLaw::says(&law, 0).is_some() && MovingPattern::new(1.0, -1.0, 1.0).is_err());
     }
 }

@@ -22,7 +22,7 @@ impl FleetLaw for Alone {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 
@@ -51,7 +51,7 @@ impl FleetLaw for SquareWave {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 

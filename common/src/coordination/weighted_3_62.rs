@@ -9,8 +9,8 @@ use crate::positive::positive;
 pub struct Weighted {
     a: f64,
     b: f64,
-    /// w_k of the link between i and j, at i n + j; symmetric.
-    weights: Vec<f64>,
+    /// i, j and w_k of every link with another weight than 1.
+    weights: Vec<(usize, usize, f64)>,
     vehicles: usize,
 }
 
@@ -18,15 +18,14 @@ impl Weighted {
     /// `a` a_i > 0 \[1/s\] and `b` b_i > 0 \[m²/s²\] as in solution II; `weights` are pairs of vehicles with the weight
     /// w_k > 0 of the link between them, every other link has 1. A pair is named once, the vehicles are below `vehicles`.
     pub fn new(a: f64, b: f64, vehicles: usize, weights: &[(usize, usize, f64)]) -> Result<Weighted, String> {
-        let mut table = vec![1.0; vehicles * vehicles];
         for &(i, j, weight) in weights {
             if i >= vehicles || j >= vehicles || i == j {
                 return Err(format!("a weight between vehicles {i} and {j} of {vehicles}"));
             }
-            let weight = positive("a weight", weight)?;
-            (table[i * vehicles + j], table[j * vehicles + i]) = (weight, weight);
+            positive("a weight", weight)?;
         }
-        Ok(Weighted { a: positive("the gain a", a)?, b: positive("the gain b", b)?, weights: table, vehicles })
+        let (a, b) = (positive("the gain a", a)?, positive("the gain b", b)?);
+        Ok(Weighted { a, b, weights: weights.to_vec(), vehicles })
     }
 }
 
@@ -35,13 +34,19 @@ impl FleetLaw for Weighted {
         DemandKind::Acceleration
     }
 
-    fn says(&self) -> Option<&'static str> {
+    fn says(&self, _: usize) -> Option<&'static str> {
         None
     }
 
     fn vehicle(&self, index: usize) -> Box<dyn VehicleLaw> {
-        let row = (index * self.vehicles).min(self.weights.len());
-        let weights = self.weights[row..].iter().take(self.vehicles).copied().collect();
+        let mut weights = vec![1.0; self.vehicles];
+        for &(i, j, weight) in &self.weights {
+            if i == index {
+                weights[j] = weight;
+            } else if j == index {
+                weights[i] = weight;
+            }
+        }
         Box::new(OneWeighted { a: self.a, b: self.b, weights })
     }
 }
@@ -148,7 +153,7 @@ mod tests {
     #[test]
     fn only_the_position_is_on_the_air_and_nonsense_is_refused() {
         let law = Weighted::new(1.0, 1.0, 2, &[]).unwrap();
-        assert!(law.says().is_none() && law.vehicle(0).says(&Own::default()).is_none());
+        assert!(law.says(0).is_none() && law.vehicle(0).says(&Own::default()).is_none());
         for wrong in [(0, 0, 1.0), (0, 2, 1.0), (0, 1, 0.0), (0, 1, f64::NAN)] {
             assert!(Weighted::new(1.0, 1.0, 2, &[wrong]).is_err(), "{wrong:?}");
         }

@@ -3,8 +3,10 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use nalgebra::SVector;
+
 use super::robot::SpeedLoop;
-use super::{Craft, Limits, Observation, SATURATED, SINGULAR, Warning, limited};
+use super::{Craft, Limits, Observation, REFUSED, SATURATED, SINGULAR, Warning, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::{Bend, Errors, Motion, Sense};
 use crate::following::proposition_3_3::{Proposition33, WantedSlip};
@@ -58,6 +60,20 @@ struct Held {
     v_ref: f64,
 }
 
+impl Held {
+    fn is_finite(&self) -> bool {
+        let Held { input: Input { surge, sway, torque }, xi_rate, v_ref } = *self;
+        [surge, sway, torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
+    }
+}
+
+/// v̇_t where the surge speed does not change and the sway force alone makes β̇: v̇_t = v_t β̇ tan β, from u̇ = 0 in
+/// (3.25). Across the bow, where sway cannot turn the flow, it is less than that and bounded.
+fn surge_held(v_t: f64, beta: f64, beta_dot: f64) -> f64 {
+    let (sin, cos) = beta.sin_cos();
+    v_t * beta_dot * sin * cos / (cos * cos).max(0.01)
+}
+
 /// A fully actuated marine vehicle under Proposition 3.3.
 #[derive(Debug)]
 pub struct MarineCraft {
@@ -75,6 +91,7 @@ pub struct MarineCraft {
     conditions: Conditions,
     saturated: u64,
     singular: u64,
+    refused: u64,
 }
 
 impl MarineCraft {
@@ -115,6 +132,7 @@ impl MarineCraft {
             conditions: Conditions::default(),
             saturated: 0,
             singular: 0,
+            refused: 0,
         })
     }
 
@@ -154,12 +172,6 @@ impl MarineCraft {
         self.xi = xi;
         self.target = self.path.at(xi);
     }
-
-    fn hold_stuck_speed(&mut self) {
-        if let Some(speed) = self.conditions.stuck_speed {
-            self.state.surge = speed;
-        }
-    }
 }
 
 impl Craft for MarineCraft {
@@ -167,9 +179,12 @@ impl Craft for MarineCraft {
         self.speed_loop.takes()
     }
 
+    /// The engine keeps its stuck surge speed at once; the sway force still works.
     fn expose(&mut self, conditions: &Conditions) {
         self.conditions = *conditions;
-        self.hold_stuck_speed();
+        if let Some(speed) = conditions.stuck_speed {
+            self.state.surge = speed;
+        }
     }
 
     /// With η = v_t − R v_L (3.38), or zero for a vehicle that takes a rate.
@@ -185,6 +200,8 @@ impl Craft for MarineCraft {
         Own { xi: self.xi, eta, r, v: flow.v_t, r_dot, ..Own::default() }
     }
 
+    /// Where forces are at their limits or the surge speed is stuck, the law knows what becomes of v_t. What a sway force at
+    /// its limit makes of β̇ it does not know: β̈ would depend on the ṙ that it is about to choose.
     fn command(&mut self, reference: SpeedReference, demand: Demand) {
         let (state, p) = (self.measured(), self.parameters);
         let flow = self.flow(&state);
@@ -192,34 +209,50 @@ impl Craft for MarineCraft {
         let e = self.errors(&state, &flow);
         // ξ̇ = ṡ/R with (3.32)
         let xi_rate = self.law.target_speed(&e, v_t) / self.target.r();
-        let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v_t, xi_rate) else { return };
-        self.sense = self.law.sense(self.sense, v_t, answer.wanted);
-        self.singular += u64::from(is_singular);
+        let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v_t, xi_rate) else {
+            self.refused += 1;
+            return;
+        };
+        let sense = self.law.sense(self.sense, v_t, answer.wanted);
 
         // τ_vt = v̇_t − f_vt, τ_β = β̇ − f_β
         let (slip, r) = (self.law.slip(beta, &self.wanted()), state.turn_rate);
+        let is_stuck = self.conditions.stuck_speed.is_some();
+        let v_dot = if is_stuck { surge_held(v_t, beta, slip.beta_dot) } else { answer.v_dot };
         let tau_beta = slip.beta_dot - p.f_beta(beta, r);
-        let [surge, sway] = p.forces(v_t, beta, answer.v_dot - p.f_vt(v_t, beta, r), tau_beta);
+        let [surge, sway] = p.forces(v_t, beta, v_dot - p.f_vt(v_t, beta, r), tau_beta);
         let ((surge, cut), (sway, cut_too)) = (limited(surge, self.limits.force), limited(sway, self.limits.force));
-        let v_dot = if cut || cut_too {
-            p.f_vt(v_t, beta, r) + beta.cos() / p.m_u * surge + beta.sin() / p.m_v * sway
-        } else {
-            answer.v_dot
+        let v_dot = match (is_stuck, cut, cut_too) {
+            (true, _, true) => beta.sin() * (sway - p.m_u * state.surge * r - p.d_v * state.sway) / p.m_v,
+            (false, true, _) | (false, _, true) => {
+                p.f_vt(v_t, beta, r) + beta.cos() / p.m_u * surge + beta.sin() / p.m_v * sway
+            }
+            _ => v_dot,
         };
-        let steering = self.law.steer(&e, &Motion { v: v_t, v_dot, r, slip }, &Bend::of(&self.target), self.sense);
+        let steering = self.law.steer(&e, &Motion { v: v_t, v_dot, r, slip }, &Bend::of(&self.target), sense);
         // (3.31)
         let (torque, cut_torque) = limited(p.m_r * (steering.r_dot - p.f_r(v_t, beta, r)), self.limits.torque);
+        let held = Held { input: Input { surge, sway, torque }, xi_rate, v_ref: answer.v_ref };
+        if !(held.is_finite() && answer.v_dot.is_finite() && steering.r_dot.is_finite()) {
+            self.refused += 1;
+            return;
+        }
+        self.singular += u64::from(is_singular);
         self.saturated += u64::from(cut || cut_too || cut_torque);
-        self.held = Held { input: Input { surge, sway, torque }, xi_rate, v_ref: answer.v_ref };
+        (self.sense, self.held) = (sense, held);
     }
 
     fn advance(&mut self, dt: f64, substeps: usize) {
-        let steps = substeps.max(1);
-        for _ in 0..steps {
-            let (state, h) = (self.state.to_vector(), dt / steps as f64);
-            self.state = State::from_vector(advance(model, &state, &self.held.input, &self.parameters, h, 1));
-            self.hold_stuck_speed();
-        }
+        let is_stuck = self.conditions.stuck_speed.is_some();
+        let held_surge = |t: f64, x: &SVector<f64, 6>, tau: &Input, p: &Parameters| {
+            let mut rate = model(t, x, tau, p);
+            if is_stuck {
+                rate[3] = 0.0;
+            }
+            rate
+        };
+        let state = self.state.to_vector();
+        self.state = State::from_vector(advance(held_surge, &state, &self.held.input, &self.parameters, dt, substeps));
         if let Some(drift) = self.conditions.drift(dt) {
             self.state.x += drift.x;
             self.state.y += drift.y;
@@ -250,18 +283,19 @@ impl Craft for MarineCraft {
     }
 
     fn is_sound(&self) -> bool {
-        let Held { input: Input { surge, sway, torque }, xi_rate, v_ref } = self.held;
-        [self.xi, surge, sway, torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
-            && self.state.to_vector().iter().all(|x| x.is_finite())
+        self.xi.is_finite() && self.held.is_finite() && self.state.to_vector().iter().all(|x| x.is_finite())
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        vec![Warning { what: SATURATED, count: self.saturated }, Warning { what: SINGULAR, count: self.singular }]
+        let counts = [(SATURATED, self.saturated), (SINGULAR, self.singular), (REFUSED, self.refused)];
+        counts.map(|(what, count)| Warning { what, count }).to_vec()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
     use nalgebra::Vector3;
     use proptest::prelude::*;
 
@@ -370,6 +404,94 @@ mod tests {
         let refused =
             MarineCraft::new(helix, law, SpeedLoop::Acceleration, SideSlip::NONE, PARAMETERS, State::default(), 0.0);
         assert!(refused.unwrap_err().contains("plane"));
+    }
+
+    /// V_p of (3.18) in the flow frame, for a surge speed that is stuck.
+    fn v_p(craft: &MarineCraft) -> f64 {
+        let (flow, r) = (craft.flow(&craft.state), craft.state.turn_rate);
+        let e = craft.errors(&craft.state, &flow);
+        let slip = craft.law.slip(flow.beta, &craft.wanted());
+        let motion = Motion { v: flow.v_t, v_dot: surge_held(flow.v_t, flow.beta, slip.beta_dot), r, slip };
+        let steering = craft.law.steer(&e, &motion, &Bend::of(&craft.target), craft.sense);
+        0.5 * (e.x_e.powi(2) + e.y_e.powi(2) + (e.psi_e - steering.sigma).powi(2) + (r - steering.phi).powi(2))
+    }
+
+    /// One period of `dt` with the surge stuck at 0.4 m/s and `rate` commanded.
+    fn stuck(craft: &mut MarineCraft, step: usize, dt: f64, rate: f64) {
+        let now = Time::from_secs(dt * step as f64);
+        craft.expose(&Conditions { now, stuck_speed: Some(0.4), ..craft.conditions });
+        craft.command(REFERENCE, Demand::Rate(rate));
+        craft.advance(dt, 1);
+        assert!(craft.is_sound() && craft.state.surge == 0.4);
+    }
+
+    #[test]
+    fn a_vehicle_whose_surge_is_stuck_stays_on_its_path_whatever_is_commanded() {
+        for (rate, side_slip) in [(-0.3, SideSlip::NONE), (0.1, WEAVING), (0.4, WEAVING)] {
+            let mut craft = craft(circle(Turn::Left), side_slip, State { x: 5.0, surge: 0.4, ..State::default() });
+            let wanted = craft.wanted();
+            craft.state.sway = 0.4 * wanted.beta.tan();
+            craft.state.heading = FRAC_PI_2 - wanted.beta;
+            craft.state.turn_rate = 0.4 / wanted.beta.cos() / 5.0 - wanted.beta_dot;
+            for step in 0..15_000 {
+                stuck(&mut craft, step, 0.002, rate);
+                let (seen, flow) = (craft.observe(), craft.flow(&craft.state));
+                assert!(seen.e_cross.abs() < 1e-4, "{rate} {step}: {seen:?}");
+                assert!((flow.beta - craft.wanted().beta).abs() < 1e-3, "{rate} {step}: {flow:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn v_p_falls_while_the_surge_is_stuck() {
+        let start = State { x: 5.6, y: -0.5, heading: 1.0, surge: 0.4, ..State::default() };
+        let mut craft = craft(circle(Turn::Left), WEAVING, start);
+        let (start, mut before) = (v_p(&craft), f64::INFINITY);
+        for step in 0..20_000 {
+            stuck(&mut craft, step, 0.001, 0.1 + 0.2 * (0.003 * step as f64).sin());
+            let now = v_p(&craft);
+            assert!(now < before + 1e-9, "{step}: {before} {now}");
+            before = now;
+        }
+        assert!(before < 1e-3 * start, "{start} {before}");
+    }
+
+    #[test]
+    fn v_t_moves_as_the_law_is_told_where_the_surge_is_stuck_and_the_sway_force_is_limited() {
+        for force in [f64::INFINITY, 40.0] {
+            let state = State { surge: 0.4, sway: 0.1, turn_rate: 0.1, ..State::default() };
+            let mut craft = craft(circle(Turn::Left), WEAVING, state).limited(Limits { force, ..Limits::NONE });
+            craft.expose(&Conditions { stuck_speed: Some(0.4), ..Conditions::default() });
+            let before = craft.flow(&craft.state);
+            craft.command(REFERENCE, Demand::Rate(0.1));
+            assert_eq!(craft.held.input.sway.abs() == 40.0, force == 40.0);
+            craft.advance(1e-6, 1);
+            let after = craft.flow(&craft.state);
+            let [v_dot, beta_dot] = [(after.v_t - before.v_t) / 1e-6, (after.beta - before.beta) / 1e-6];
+            assert!((v_dot - before.v_t * before.beta.tan() * beta_dot).abs() < 1e-6, "u does not change");
+            let slip = craft.law.slip(before.beta, &craft.wanted());
+            assert_eq!((beta_dot - slip.beta_dot).abs() < 1e-5, force > 40.0, "{beta_dot} {slip:?}");
+        }
+        // Across the bow nothing is singular.
+        for beta in [0.5 * PI, 1.5, -1.6] {
+            assert!(surge_held(0.5, beta, 0.1).abs() < 0.5, "{beta}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_and_counted() {
+        let mut craft = craft(circle(Turn::Left), WEAVING, State { x: 5.0, surge: 0.4, ..State::default() });
+        craft.command(REFERENCE, Demand::Rate(0.1));
+        let held = craft.held.input;
+        for demand in [Demand::Rate(f64::NAN), Demand::Rate(1e308), Demand::Acceleration(0.0)] {
+            craft.command(REFERENCE, demand);
+            assert!(craft.held.input == held && craft.is_sound(), "{demand:?}");
+        }
+        let errors = InstrumentErrors { spin: Vector3::repeat(f64::NAN), ..InstrumentErrors::default() };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        craft.command(REFERENCE, Demand::Rate(0.1));
+        assert!(craft.held.input == held && craft.is_sound());
+        assert_eq!(craft.warnings()[2], Warning { what: REFUSED, count: 4 });
     }
 
     proptest! {

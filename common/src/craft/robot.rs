@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Craft, Limits, Observation, SATURATED, Warning, limited};
+use super::{Craft, Limits, Observation, REFUSED, SATURATED, Warning, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::{Bend, Errors, Gains, Motion, Proposition31, Sense, Steering};
 use crate::following::proposition_3_2::Proposition32;
@@ -121,6 +121,13 @@ struct Held {
     v_ref: f64,
 }
 
+impl Held {
+    fn is_finite(&self) -> bool {
+        let Held { input: Input { force, torque }, xi_rate, v_ref } = *self;
+        [force, torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
+    }
+}
+
 /// A wheeled robot under Proposition 3.1 or 3.2.
 #[derive(Debug)]
 pub struct RobotCraft {
@@ -137,6 +144,7 @@ pub struct RobotCraft {
     limits: Limits,
     conditions: Conditions,
     saturated: u64,
+    refused: u64,
 }
 
 impl RobotCraft {
@@ -174,6 +182,7 @@ impl RobotCraft {
             limits: Limits::NONE,
             conditions: Conditions::default(),
             saturated: 0,
+            refused: 0,
         })
     }
 
@@ -230,23 +239,32 @@ impl Craft for RobotCraft {
         Own { xi: self.xi, eta, r, v: state.speed, r_dot, ..Own::default() }
     }
 
-    /// Where the force is at its limit, the law knows that it is.
+    /// Where the force is at its limit or the speed is stuck, the law knows that it is.
     fn command(&mut self, reference: SpeedReference, demand: Demand) {
         let state = self.measured();
         let (v, e) = (state.speed, self.errors(&state));
         // ξ̇ = ṡ/R = (v cos ψ_e + k₃ x_e)/R (3.35)
         let xi_rate = self.law.target_speed(&e, v) / self.target.r();
-        let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v, xi_rate) else { return };
-        self.sense = self.law.gains().sense(self.sense, v, answer.wanted);
+        let Some(answer) = self.speed_loop.answer(demand, reference, &self.target, v, xi_rate) else {
+            self.refused += 1;
+            return;
+        };
+        let sense = self.law.gains().sense(self.sense, v, answer.wanted);
         let Parameters { mass, inertia } = self.parameters;
         let (force, cut) = limited(mass * answer.v_dot, self.limits.force);
         let v_dot = if cut { force / mass } else { answer.v_dot };
+        // A speed that is stuck does not change, whatever is commanded; the vehicle knows of its failure.
+        let v_dot = if self.conditions.stuck_speed.is_some() { 0.0 } else { v_dot };
         let motion = Motion { v, v_dot, r: state.turn_rate, ..Motion::default() };
-        let steering = self.law.steer(&e, &motion, &Bend::of(&self.target), self.sense);
+        let steering = self.law.steer(&e, &motion, &Bend::of(&self.target), sense);
         let (torque, cut_too) = limited(inertia * steering.r_dot, self.limits.torque);
+        let held = Held { input: Input { force, torque }, xi_rate, v_ref: answer.v_ref };
+        if !(held.is_finite() && answer.v_dot.is_finite() && steering.r_dot.is_finite()) {
+            self.refused += 1;
+            return;
+        }
         self.saturated += u64::from(cut || cut_too);
-        let input = Input { force, torque };
-        self.held = Held { input, xi_rate, v_ref: answer.v_ref };
+        (self.sense, self.held) = (sense, held);
     }
 
     fn advance(&mut self, dt: f64, substeps: usize) {
@@ -283,13 +301,11 @@ impl Craft for RobotCraft {
     }
 
     fn is_sound(&self) -> bool {
-        let Held { input, xi_rate, v_ref } = self.held;
-        [self.xi, input.force, input.torque, xi_rate, v_ref].iter().all(|x| x.is_finite())
-            && self.state.to_vector().iter().all(|x| x.is_finite())
+        self.xi.is_finite() && self.held.is_finite() && self.state.to_vector().iter().all(|x| x.is_finite())
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        vec![Warning { what: SATURATED, count: self.saturated }]
+        vec![Warning { what: SATURATED, count: self.saturated }, Warning { what: REFUSED, count: self.refused }]
     }
 }
 
@@ -307,8 +323,8 @@ mod tests {
     use crate::coordination::solution_3_3_45::SolutionThree;
     use crate::coordination::switching_4_21::Switching;
     use crate::coordination::{CoordinationLaw, Demand, DemandKind, Neighbour, SpeedReference};
-    use crate::craft::{Craft, Limits};
-    use crate::following::proposition_3_1::{Approach, Gains, Proposition31};
+    use crate::craft::{Craft, Limits, REFUSED, Warning};
+    use crate::following::proposition_3_1::{Approach, Bend, Gains, Motion, Proposition31};
     use crate::path::Path;
     use crate::path::chain::{Chain, Segment};
     use crate::path::circle::{Circle, Turn};
@@ -448,6 +464,32 @@ mod tests {
     }
 
     #[test]
+    fn who_is_far_ahead_backs_up_along_its_path_unless_the_saturation_forbids_it() {
+        // Erratum 3.17: nothing keeps v_i above zero.
+        let slowest = |law: &dyn CoordinationLaw| {
+            let line = |y| Line::new(Vector3::new(0.0, y, 0.0), 0.0, 1.0).unwrap();
+            let mut fleet = [robot(line(0.0), 4.0, 0.3, 0.0), robot(line(1.0), 0.0, 0.7, 0.0)];
+            for craft in &mut fleet {
+                craft.state.speed = 0.1;
+            }
+            let mut slowest = f64::INFINITY;
+            for _ in 0..1500 {
+                fleet = run(fleet, law, [&[1], &[0]], 0.2, 0.02);
+                slowest = slowest.min(fleet[0].observe().speed);
+            }
+            let [one, two] = fleet.map(|craft| craft.observe());
+            assert!((one.xi - two.xi).abs() < 1e-2 && (one.speed - 0.1).abs() < 1e-2, "{one:?} {two:?}");
+            assert!(one.e_norm < 1e-3 && one.psi_e.abs() < 1e-3, "{one:?}");
+            slowest
+        };
+        let backwards = slowest(&SolutionTwo::new(1.0, 0.3).unwrap());
+        assert!(backwards < -0.3, "{backwards}");
+        // b x_m/a = 0.05 < v_L
+        let forwards = slowest(&SolutionThree::new(1.0, 0.25, 0.2).unwrap());
+        assert!(forwards > 0.0, "{forwards}");
+    }
+
+    #[test]
     fn a_rate_is_followed_by_the_speed() {
         let speed_loop = SpeedLoop::Rate { k_0: 2.0 };
         let circle = |radius| Circle::new(Vector3::zeros(), radius, Turn::Left, 0.0, 1.0).unwrap();
@@ -559,6 +601,70 @@ mod tests {
         craft.advance(0.02, 1);
         let seen = craft.observe();
         assert!((seen.e_cross + 0.006).abs() < 1e-6 && seen.speed == 0.25, "{seen:?}");
+    }
+
+    /// V_p of (3.18), with what the law knows of v̇ where the speed is stuck.
+    fn v_p(craft: &RobotCraft) -> f64 {
+        let State { speed: v, turn_rate: r, .. } = craft.state;
+        let e = craft.errors(&craft.state);
+        let motion = Motion { v, r, ..Motion::default() };
+        let steering = craft.law.steer(&e, &motion, &Bend::of(&craft.target), craft.sense);
+        0.5 * (e.x_e.powi(2) + e.y_e.powi(2) + (e.psi_e - steering.sigma).powi(2) + (r - steering.phi).powi(2))
+    }
+
+    #[test]
+    fn a_robot_whose_speed_is_stuck_stays_on_its_path_whatever_is_commanded() {
+        let stuck = Conditions { stuck_speed: Some(0.25), ..Conditions::default() };
+        for demand in [-0.8, 0.0, 0.5] {
+            let mut craft =
+                robot(Circle::new(Vector3::zeros(), 2.0, Turn::Left, 0.0, 1.0).unwrap(), 2.0, 0.0, FRAC_PI_2);
+            (craft.state.speed, craft.state.turn_rate) = (0.25, 0.125);
+            for _ in 0..2000 {
+                craft.expose(&stuck);
+                craft.command(REFERENCE, Demand::Acceleration(demand));
+                craft.advance(0.02, 2);
+                let seen = craft.observe();
+                assert!(seen.e_cross.abs() < 1e-9 && seen.speed == 0.25, "{demand}: {seen:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn v_p_falls_while_the_speed_is_stuck() {
+        let stuck = Conditions { stuck_speed: Some(0.25), ..Conditions::default() };
+        let mut craft = robot(Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap(), 0.1, 0.6, 0.2);
+        craft.expose(&stuck);
+        let (start, mut before) = (v_p(&craft), f64::INFINITY);
+        for step in 0..10_000 {
+            craft.expose(&stuck);
+            craft.command(REFERENCE, Demand::Acceleration(0.4 * (0.01 * f64::from(step)).sin()));
+            let now = v_p(&craft);
+            assert!(now < before + 1e-9, "{step}: {before} {now}");
+            before = now;
+            craft.advance(0.002, 1);
+        }
+        assert!(before < 1e-3 * start, "{start} {before}");
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_and_counted() {
+        let line = || Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
+        let mut craft = robot(line(), 0.0, 0.5, 0.0);
+        craft.command(REFERENCE, Demand::Acceleration(0.2));
+        let held = (craft.held.input, craft.sense);
+        // The last one's force is beyond the numbers; one is of the other kind.
+        for demand in
+            [Demand::Acceleration(f64::NAN), Demand::Forward(f64::INFINITY), Demand::Rate(1.0), Demand::Forward(1e308)]
+        {
+            craft.command(REFERENCE, demand);
+            assert!((craft.held.input, craft.sense) == held && craft.is_sound(), "{demand:?}");
+        }
+        craft.command(SpeedReference { v_l: f64::NAN, v_l_dot: 0.0 }, Demand::Acceleration(0.1));
+        let errors = InstrumentErrors { heading: f64::NAN, ..InstrumentErrors::default() };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        craft.command(REFERENCE, Demand::Acceleration(0.1));
+        assert!((craft.held.input, craft.sense) == held && craft.is_sound());
+        assert_eq!(craft.warnings()[1], Warning { what: REFUSED, count: 6 });
     }
 
     #[test]

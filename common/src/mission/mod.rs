@@ -66,6 +66,8 @@ pub struct Mission {
     pub law: Arc<dyn FleetLaw>,
     /// Which law, with its gains, as written.
     pub law_choice: file::LawChoice,
+    /// The same for each vehicle, with its own gains if it has some.
+    pub law_choices: Vec<file::LawChoice>,
     /// A neighbour leaves N_i after this silence.
     pub validity: Option<Span>,
     /// What stands for a neighbour's state between its messages.
@@ -163,6 +165,23 @@ impl Mission {
     /// Whether messages are lost by the switching of links only.
     pub fn loses_by_switching_only(&self) -> bool {
         self.medium.is_none() && !self.links.iter().any(Link::loses)
+    }
+
+    /// The gain of this name (`gain`, `a` or `b`) of each vehicle, if the law is one under which vehicles may have their
+    /// own; else nothing.
+    pub fn gains(&self, name: &str) -> Vec<f64> {
+        let of_one = |choice: &file::LawChoice| {
+            let mut choice = choice.clone();
+            let gains = build::gains_by_vehicle(&mut choice);
+            gains.iter().find(|(known, _)| *known == name).map(|(_, gain)| **gain)
+        };
+        self.law_choices.iter().filter_map(of_one).collect()
+    }
+
+    /// Whether no vehicle has other gains than the rest.
+    pub fn has_equal_gains(&self) -> bool {
+        let equal = |gains: Vec<f64>| gains.windows(2).all(|pair| pair[0] == pair[1]);
+        ["gain", "a", "b"].iter().all(|name| equal(self.gains(name)))
     }
 
     /// The delay τ that the law was told, if it takes one \[s\].
@@ -266,7 +285,7 @@ impl Mission {
             seq: 0,
             made: Time::ZERO,
             xi: 0.0,
-            scalar: self.law.says().map(|_| 0.0),
+            scalar: self.law.says(vehicle).map(|_| 0.0),
         };
         let mut word = Word::from(state);
         for _ in 0..acknowledgements(self, vehicle) {

@@ -12,6 +12,27 @@
 //! Both need the gateway's sums with the sign of (2.32); with that of (2.33) as printed, the second is unstable for the
 //! thesis' own gains (erratum 2.2).
 
+//!
+//! # The extra integrator and a stuck follower
+//!
+//! With P = bs² + cs + d, F = s³(s + a) and ρ + 1/ρ = n, ρ ≤ 1, the polynomial of the stuck fleet is
+//! (F + ρP)(F + P/ρ) + b_0 s²(F + P), so its roots are those of
+//!
+//! ```text
+//! 1 + b_0 H(s) = 0,    H = s² ( ρ/(1 + ρ) /(F + ρP) + 1/(1 + ρ) /(F + P/ρ) )
+//! ```
+//!
+//! If d < ρ(ab − c)c/a², there is a κ with a²d/c ≤ κ ≤ ρ(ab − c). M = as + a² + κ/s has a real part of at least a² where
+//! Re s ≥ 0, and on s = jω, x = ω², the real part of M s²/(F + μP) has the sign of
+//!
+//! ```text
+//! a (μ(ab − c) − κ) x + μ (κc − a²d)
+//! ```
+//!
+//! which is not negative for μ = ρ and μ = 1/ρ, whose F + μP are stable. So M + b_0 M H has no root there, for any b_0 > 0. ∎
+//! For b_0 → 0 the roots are those of F + ρP and F + P/ρ: with a larger d some b_0 are too small. A stable q (ρ = 1) is enough
+//! for two vehicles alone.
+
 use super::Verdict;
 use super::polynomial::{abscissa, add, is_hurwitz, multiply, product, scale};
 
@@ -87,6 +108,16 @@ impl Gateway {
     fn with_followers(&self, gateway: Vec<f64>, count: usize) -> Vec<f64> {
         let q = self.follower();
         (0..count).fold(gateway, |whole, _| multiply(&whole, &q))
+    }
+
+    /// The d below which the fleet with the extra integrator bears a stuck follower, whatever b_0 is:
+    /// ρ(ab − c)c/a² \[1/s⁴\], with ρ + 1/ρ = n, ρ ≤ 1 (result xi of docs/errata.md); `None` without the integrator.
+    pub fn greatest_d(&self) -> Option<f64> {
+        let &[b, c, _] = self.distance.as_slice() else { return None };
+        // ρ = (n − √(n² − 4))/2 without its cancellation.
+        let n = (self.n as f64).max(2.0);
+        let rho = 2.0 / (n + (n * n - 4.0).sqrt());
+        Some(rho * (self.a * b - c) * c / (self.a * self.a))
     }
 
     /// s̄_21 → (b_0/c)(v_0/R_2 − v_1/R_1): the steady error of a vehicle whose speed is stuck at v_0 (2.43); none with
@@ -199,6 +230,26 @@ mod tests {
         assert!(fleet.nominal().iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
+    #[test]
+    fn the_gains_of_section_2_5_3_bear_a_stuck_follower_among_five_vehicles_and_not_among_six() {
+        let fleet = |n, b_0| Gateway { b_0, n, ..section_2_5_3(true) };
+        assert!((2..=5).all(|n| [1e-3, 0.5, 5.0, 100.0].iter().all(|b_0| fleet(n, *b_0).verdict(true).holds)));
+        assert!(fleet(5, 5.0).greatest_d() > Some(1.0) && fleet(6, 5.0).greatest_d() < Some(1.0));
+        assert!(!fleet(6, 0.5).verdict(true).holds && !fleet(8, 3.0).verdict(true).holds);
+        assert!(section_2_5_3(false).greatest_d().is_none());
+    }
+
+    #[test]
+    fn with_the_extra_integrator_a_stable_q_is_not_enough_for_every_b_0() {
+        // The claim below (2.35) is of a, b and c alone.
+        let (a, b) = (0.59, 5.88);
+        let c = 0.189 * a * b;
+        let d = 0.751 * (a * b - c) * c / (a * a);
+        let fleet = |b_0| Gateway { a, distance: vec![b, c, d], b_0, n: 5 };
+        assert!(is_hurwitz(&fleet(1.0).follower()) && fleet(1.0).greatest_d() < Some(d));
+        assert!(fleet(1.0).verdict(false).holds && !fleet(8.0).verdict(false).holds);
+    }
+
     fn any_fleet() -> impl Strategy<Value = Gateway> {
         (0.2..4.0f64, prop::collection::vec(0.1..4.0f64, 2..4), 0.1..8.0f64, 2usize..6)
             .prop_map(|(a, distance, b_0, n)| Gateway { a, distance, b_0, n })
@@ -234,6 +285,24 @@ mod tests {
             for factor in fleet.factors(false) {
                 prop_assert!(abscissa(&factor).is_some_and(|slowest| slowest < 1e-9), "{:?}", fleet);
             }
+        }
+
+        /// Result xi.
+        #[test]
+        fn with_a_small_d_a_stuck_follower_is_borne_whatever_b_0_is(a in 0.2..4.0f64, b in 0.1..6.0f64,
+            part in 0.02..0.98f64, of_d in 0.02..0.98f64, log_b_0 in -3.0..3.0f64, n in 2usize..9) {
+            let mut fleet = Gateway { a, distance: vec![b, part * a * b, 0.0], b_0: 10f64.powf(log_b_0), n };
+            fleet.distance[2] = of_d * fleet.greatest_d().expect("with the integrator");
+            prop_assert!(is_hurwitz(&fleet.follower()) && fleet.verdict(true).holds, "{:?}", fleet);
+        }
+
+        #[test]
+        fn with_a_larger_d_some_b_0_are_too_small(a in 0.2..4.0f64, b in 0.1..6.0f64, part in 0.05..0.95f64,
+            more in 1.05..2.5f64, n in 3usize..9) {
+            let mut fleet = Gateway { a, distance: vec![b, part * a * b, 0.0], b_0: 1e-6, n };
+            fleet.distance[2] = more * fleet.greatest_d().expect("with the integrator");
+            // Each follower alone is still stable.
+            prop_assert!(is_hurwitz(&fleet.follower()) && !fleet.verdict(true).holds, "{:?}", fleet);
         }
 
         #[test]

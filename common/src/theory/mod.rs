@@ -8,6 +8,7 @@
 //! | two-way fixed networks | Propositions 3.4, 3.5; (3.41), (3.48), (3.75) | agreement; exact rates, and one for varying R_i proven here | [`proposition_3_4`], [`linear_coordination`] |
 //! | one-way fixed networks | Propositions 3.6, 3.7, (3.73), (3.81), (3.85), (3.93); errata 3.13, 3.15, 3.16 | agreement at the slowest root | [`proposition_3_6`] |
 //! | bounded speeds with saturation | Proposition 3.8, Lemma 6.1, (3.97); erratum 3.14 | Q > 0 | [`proposition_3_8`] |
+//! | disturbed path following | Assumption 4.1, (4.25)–(4.28); erratum 4.5 | \|ζ\| in the end below gains times what disturbs it | [`assumption_4_1`] |
 //! | brief connectivity losses | Theorem 4.4; errata 4.4, 4.6 | V at λ_0 − 2αk_mλ_m or min(λ_1, 2(1 − α)k_mλ_m), norms at half | [`theorem_4_4`] |
 //! | connected in mean | Theorems 4.2, 4.5; erratum 4.7 | agreement, with a rate proven here | [`theorem_4_5`] |
 //! | event-triggered talk | this project; (4.21) with beliefs | ‖γ~‖ in the end below √n‖ΠA‖/λ_2 times the error of a belief | [`event_triggered`] |
@@ -22,6 +23,7 @@
 
 use serde::Serialize;
 
+pub mod assumption_4_1;
 pub mod decoupling_2_37;
 pub mod delay;
 pub mod delay_rate;
@@ -75,18 +77,6 @@ pub enum PathFollowing {
         /// λ_1: decay rate of W_i \[1/s\], positive.
         lambda_1: f64,
     },
-}
-
-impl PathFollowing {
-    /// ρ_v and ρ_d of section 4.1.1: the gains from sup|v~_r| and sup|d_i| to |ζ_i|, √(ρ_1/(λ_1α_1)) and √(ρ_2/(λ_1α_1)) (the
-    /// second is printed without its root, erratum 4.5). `None` for type II, whose constants are not looked at.
-    #[doc(alias = "ρ_v")]
-    #[doc(alias = "ρ_d")]
-    pub fn iss_gains(&self, rho_2: f64) -> Option<(f64, f64)> {
-        let PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } = *self else { return None };
-        let gain = |rho: f64| (rho / (lambda_1 * alpha_1)).sqrt();
-        Some((gain(rho_1), gain(rho_2)))
-    }
 }
 
 /// What Theorem 4.7 with (4.53) needs to be known of a vehicle and its path: W_4 then has the constants of Assumption 4.1.
@@ -177,13 +167,6 @@ mod tests {
     use std::path::Path;
 
     use super::{PathFollowing, Underactuated};
-
-    #[test]
-    fn erratum_4_5_both_gains_of_section_4_1_1_have_a_root() {
-        let following = PathFollowing::TypeI { lambda_1: 2.0, rho_1: 8.0, alpha_1: 1.0 };
-        assert_eq!(following.iss_gains(18.0), Some((2.0, 3.0)));
-        assert_eq!(PathFollowing::TypeII { lambda_1: 2.0 }.iss_gains(18.0), None);
-    }
 
     #[test]
     fn the_constants_of_theorem_4_7_bear_what_young_says() {

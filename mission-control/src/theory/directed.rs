@@ -50,14 +50,18 @@ pub(super) fn rows_of_a_told_vehicle(case: &Case<'_>, law: &TrulyDecentralised) 
 }
 
 fn row(case: &Case<'_>, verdict: Verdict) -> TheoryRow {
-    let constant = constant_r(case.mission).is_some();
-    let rate = verdict.norm_rate.filter(|_| constant);
-    let varying = if constant { "" } else { "; R_i varies along the paths" };
+    let (constant, equal) = (constant_r(case.mission).is_some(), case.mission.has_equal_gains());
+    let rate = verdict.norm_rate.filter(|_| constant && equal);
+    let varying = match (constant, equal) {
+        (false, _) => "; R_i varies along the paths",
+        (true, false) => "; unequal gains, of which nothing is promised over one-way links",
+        (true, true) => "",
+    };
     TheoryRow {
         name: format!("Agreement ({})", verdict.name),
         condition: format!("constant R_i; {}", verdict.condition),
         value: format!("{}{varying}", verdict.value),
-        holds: Some(verdict.holds && constant),
+        holds: Some(verdict.holds && constant && equal),
         predicted: rate.map_or("–".into(), |rate| format!("slowest mode {rate:.5} 1/s")),
         guaranteed_rate: rate,
         measured: case.fitted_rate(),

@@ -82,9 +82,10 @@ fn eigenvalues(network: &Network) -> Option<Figure> {
 }
 
 fn loss_rate(mission: &Mission, network: &Network) -> Option<Figure> {
-    let LawChoice::Switching(law) = &mission.law_choice else { return None };
+    let LawChoice::Switching(_) = &mission.law_choice else { return None };
+    let gains = mission.gains("gain");
     let at = |alpha: f64| {
-        let coordination = Coordination::new(&network.graphs, &vec![law.gain; mission.vehicles.len()], alpha)?;
+        let coordination = Coordination::new(&network.graphs, &gains, alpha)?;
         Some((alpha, coordination.rate_of_agreement()))
     };
     let promised: Vec<(f64, f64)> = (0..=100).filter_map(|i| at(f64::from(i) / 100.0)).collect();

@@ -107,8 +107,8 @@ pub fn guarantee(mission: &Mission) -> Option<Guarantee> {
 
 fn guarantee_of(case: &Case<'_>) -> Option<Guarantee> {
     match &case.mission.law_choice {
-        LawChoice::Introduction(law) => introduction::guarantee(case, law),
-        LawChoice::Switching(law) => switching::guarantee(case, law),
+        LawChoice::Introduction(_) => introduction::guarantee(case),
+        LawChoice::Switching(_) => switching::guarantee(case),
         LawChoice::AuxiliarySwitching(law) => auxiliary::guarantee(case, law),
         _ => None,
     }
@@ -134,7 +134,7 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
 /// What the statements behind the mission's law ask for and promise.
 fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
     match &case.mission.law_choice {
-        LawChoice::Introduction(law) => introduction::rows(case, law),
+        LawChoice::Introduction(_) => introduction::rows(case),
         LawChoice::LeaderIntegral(law) => introduction::rows_of_a_leader(case, law),
         LawChoice::LeaderFollower(law) => learned_speeds::rows_of_a_leader(case, law),
         LawChoice::Gateway(law) => {
@@ -157,7 +157,7 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
         LawChoice::TrulyDecentralised(law) => directed::rows_of_a_told_vehicle(case, law),
         LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
         LawChoice::AuxiliarySwitching(law) => auxiliary::rows_switching(case, law),
-        LawChoice::Switching(law) => switching::rows(case, law),
+        LawChoice::Switching(_) => switching::rows(case),
         LawChoice::DelayedEstimating(_) => talk::rows_of_estimating(case),
         LawChoice::KnownDelay(law) => talk::rows_of_known_delay(case, law),
         LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),

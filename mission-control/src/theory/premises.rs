@@ -21,16 +21,15 @@ pub(super) struct Looked {
 
 /// What the monitor looks for; `None` if no statement about switching networks speaks of the mission's law.
 pub(super) fn looked_for(mission: &Mission, network: &Network) -> Option<Looked> {
-    let n = mission.vehicles.len();
     let at_once = || late_or_lost(mission, Span::ZERO).into_iter().collect::<Vec<Premise>>();
     let (watched, mut broken, told) = match &mission.law_choice {
-        LawChoice::Switching(law) => {
+        LawChoice::Switching(_) => {
             let mut broken = at_once();
             let following = following(mission).unwrap_or_else(|premise| {
                 broken.push(premise);
                 PathFollowing::TypeII { lambda_1: f64::INFINITY }
             });
-            (Watched::Agreement(vec![law.gain; n], following), broken, Span::ZERO)
+            (Watched::Agreement(mission.gains("gain"), following), broken, Span::ZERO)
         }
         LawChoice::AuxiliarySwitching(law) => {
             let mut broken = at_once();

@@ -203,6 +203,7 @@ mod tests {
             vehicles: vehicles.collect(),
             collected: false,
             messages: [0; 4],
+            pace: None,
         };
         (mission, status)
     }

@@ -40,9 +40,15 @@ pub(super) fn summary_of(places: &[Vec<f64>]) -> PathRates {
 pub(super) fn rows(case: &Case<'_>, law: Law) -> Vec<TheoryRow> {
     let graph = &case.network.graph;
     let places = path_rates(case.mission);
-    let mut rows = vec![case.row(proposition_3_4::verdict(law, graph, &summary_of(&places), case.network.is_fixed()))];
-    if let Law::SolutionThree { a, .. } = law {
-        let bounded = proposition_3_8::verdict(graph, &vec![a; graph.len()], &places);
+    let mut verdict = proposition_3_4::verdict(law, graph, &summary_of(&places), case.network.is_fixed());
+    if !case.mission.has_equal_gains() {
+        // The propositions hold for every A and B, the rate is of equal gains.
+        verdict.norm_rate = None;
+        verdict.value += ", unequal gains";
+    }
+    let mut rows = vec![case.row(verdict)];
+    if let Law::SolutionThree { .. } = law {
+        let bounded = proposition_3_8::verdict(graph, &case.mission.gains("a"), &places);
         rows.push(TheoryRow {
             predicted: if bounded.holds { "speeds stay bounded, paths are reached".into() } else { "–".into() },
             measured: case.measured(|s| format!("{:.3e} m off the paths at the end", s.fleet.path_error_final_m)),

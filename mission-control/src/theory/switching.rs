@@ -1,6 +1,5 @@
 //! Coordination over a switching network, (4.21).
 
-use common::mission::file::GainOnly;
 use common::theory::monitor::Watched;
 use common::theory::theorem_4_4::Coordination;
 use common::theory::{Gains, PathFollowing, theorem_4_5};
@@ -12,24 +11,24 @@ use super::{Case, Guarantee};
 use crate::results::TheoryRow;
 
 /// Theorem 4.4 for targets that move as told.
-pub(super) fn guarantee(case: &Case<'_>, law: &GainOnly) -> Option<Guarantee> {
-    if !(case.network.immediate && moves_as_told(case.mission)) || case.network.cut_off || !rare(case, law).is_empty() {
+pub(super) fn guarantee(case: &Case<'_>) -> Option<Guarantee> {
+    if !(case.network.immediate && moves_as_told(case.mission)) || case.network.cut_off || !rare(case).is_empty() {
         return None;
     }
-    let coordination = coordination(case, law)?;
+    let coordination = coordination(case)?;
     let factor = case.network.t_0().map(|t_0| coordination.overshoot(t_0));
     Some(Guarantee { rate: coordination.rate_of_agreement(), factor }).filter(|g| g.rate > 0.0)
 }
 
-fn coordination(case: &Case<'_>, law: &GainOnly) -> Option<Coordination> {
-    let gains = vec![law.gain; case.mission.vehicles.len()];
+fn coordination(case: &Case<'_>) -> Option<Coordination> {
+    let gains = case.mission.gains("gain");
     Coordination::new(&case.network.graphs, &gains, case.network.alpha())
 }
 
-pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
+pub(super) fn rows(case: &Case<'_>) -> Vec<TheoryRow> {
     let (four, five) = match following(case.mission) {
-        Ok(type_1 @ PathFollowing::TypeI { .. }) => return rows_of_type_1(case, law, type_1),
-        _ => (theorem_4_4(case, law), theorem_4_5(case, law)),
+        Ok(type_1 @ PathFollowing::TypeI { .. }) => return rows_of_type_1(case, type_1),
+        _ => (theorem_4_4(case), theorem_4_5(case)),
     };
     // One of the two is enough: the one that covers the mission is shown, both if both do.
     match (four.holds, five.holds) {
@@ -40,12 +39,12 @@ pub(super) fn rows(case: &Case<'_>, law: &GainOnly) -> Vec<TheoryRow> {
 }
 
 /// Both theorems for targets with dynamics of their own (4.53): errors go into a ball that δ and other disturbances set.
-fn rows_of_type_1(case: &Case<'_>, law: &GainOnly, type_1: PathFollowing) -> Vec<TheoryRow> {
+fn rows_of_type_1(case: &Case<'_>, type_1: PathFollowing) -> Vec<TheoryRow> {
     let network = &case.network;
-    let met = network.immediate && !network.cut_off && rare(case, law).is_empty();
+    let met = network.immediate && !network.cut_off && rare(case).is_empty();
     let PathFollowing::TypeI { lambda_1, rho_1, alpha_1 } = type_1 else { return Vec::new() };
-    let constants = format!("λ₁ = {lambda_1:.5} 1/s, ρ₁ = {rho_1:.5}, α₁ = {alpha_1:.2}{}", obstacles(case, law));
-    let four = coordination(case, law).map(|coordination| coordination.verdict(type_1));
+    let constants = format!("λ₁ = {lambda_1:.5} 1/s, ρ₁ = {rho_1:.5}, α₁ = {alpha_1:.2}{}", obstacles(case));
+    let four = coordination(case).map(|coordination| coordination.verdict(type_1));
     let four = match four {
         Some(verdict) => TheoryRow {
             condition: format!("two-way links, no delay, no loss; {}", verdict.condition),
@@ -67,7 +66,7 @@ fn rows_of_type_1(case: &Case<'_>, law: &GainOnly, type_1: PathFollowing) -> Vec
             ..TheoryRow::default()
         },
     };
-    let five = Gains::new(&vec![law.gain; case.mission.vehicles.len()]).map(|gains| {
+    let five = Gains::new(&case.mission.gains("gain")).map(|gains| {
         let verdict =
             theorem_4_5::verdict(gains, network.planned.connected_in_mean(), dwell(case), two_way(case), type_1);
         TheoryRow {
@@ -91,14 +90,14 @@ fn two_way(case: &Case<'_>) -> bool {
 }
 
 /// The conditions on messages in periods that the plan does not meet.
-fn rare(case: &Case<'_>, law: &GainOnly) -> Vec<String> {
-    let gains = vec![law.gain; case.mission.vehicles.len()];
+fn rare(case: &Case<'_>) -> Vec<String> {
+    let gains = case.mission.gains("gain");
     let watched = Watched::Agreement(gains, PathFollowing::TypeII { lambda_1: f64::INFINITY });
     too_rare(case.mission, &case.network, &watched)
 }
 
 /// What is in the way of both theorems.
-fn obstacles(case: &Case<'_>, law: &GainOnly) -> String {
+fn obstacles(case: &Case<'_>) -> String {
     let mut obstacles = String::new();
     if let Some(premise) = late_or_lost(case.mission, common::time::Span::ZERO) {
         obstacles += &format!("; messages: {}", premise.found);
@@ -109,7 +108,7 @@ fn obstacles(case: &Case<'_>, law: &GainOnly) -> String {
     if !two_way(case) {
         obstacles += "; one-way links, which the thesis leaves to the literature";
     }
-    for rare in rare(case, law) {
+    for rare in rare(case) {
         obstacles += &format!("; {rare}");
     }
     if case.network.cut_off {
@@ -118,17 +117,17 @@ fn obstacles(case: &Case<'_>, law: &GainOnly) -> String {
     obstacles
 }
 
-fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
-    let guarantee = guarantee(case, law);
-    let lambda_m = coordination(case, law).map_or("unknown".to_string(), |c| format!("{:.5}", c.lambda_m));
+fn theorem_4_4(case: &Case<'_>) -> TheoryRow {
+    let guarantee = guarantee(case);
+    let lambda_m = coordination(case).map_or("unknown".to_string(), |c| format!("{:.5}", c.lambda_m));
     TheoryRow {
         name: "Theorem 4.4 (rate of the norm, erratum 4.4)".into(),
         condition: "two-way links, α < 1, no delay, no loss, short periods, targets that move as told (type II)".into(),
         value: format!(
             "α = {:.4}, k_m = {:.4} 1/s, λ_m = {lambda_m}{}",
             case.network.alpha(),
-            law.gain,
-            obstacles(case, law)
+            case.mission.gains("gain").into_iter().fold(f64::INFINITY, f64::min),
+            obstacles(case)
         ),
         holds: Some(guarantee.is_some()),
         predicted: guarantee.map_or("–".into(), |g| format!("‖e‖ decays at ≥ {:.5} 1/s", g.rate)),
@@ -137,13 +136,12 @@ fn theorem_4_4(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
     }
 }
 
-fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
+fn theorem_4_5(case: &Case<'_>) -> TheoryRow {
     let Case { mission, network, .. } = case;
-    let met =
-        network.immediate && moves_as_told(mission) && two_way(case) && !network.cut_off && rare(case, law).is_empty();
+    let met = network.immediate && moves_as_told(mission) && two_way(case) && !network.cut_off && rare(case).is_empty();
     let mean = network.planned.connected_in_mean();
     let dwell = dwell(case);
-    let proven = Gains::new(&vec![law.gain; mission.vehicles.len()])
+    let proven = Gains::new(&mission.gains("gain"))
         .zip(mean)
         .filter(|_| met)
         .and_then(|(gains, mean)| theorem_4_5::agreement(gains, mean, dwell))
@@ -156,7 +154,7 @@ fn theorem_4_5(case: &Case<'_>, law: &GainOnly) -> TheoryRow {
         value: format!(
             "{}, dwell time {dwell}{}",
             mean.map_or("never connected in mean".to_string(), |mean| format!("T = {mean}")),
-            obstacles(case, law)
+            obstacles(case)
         ),
         holds: Some(mean.is_some() && met),
         predicted: match proven {

@@ -68,9 +68,11 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
     let Case { mission, network, .. } = case;
     let trigger = mission.talk?;
     let LawChoice::Switching(law) = &mission.law_choice else { return None };
+    // The bound is of equal gains.
+    let gain = mission.has_equal_gains().then_some(law.gain);
     let used = mission.control_period * (mission.message_ticks + 1) + trigger.least_silence();
-    let bound = greatest_delay(mission).and_then(|slowest| {
-        event_triggered::ultimate_bound(&network.graph, law.gain, trigger.floor(), (used + slowest).secs())
+    let bound = greatest_delay(mission).zip(gain).and_then(|(slowest, gain)| {
+        event_triggered::ultimate_bound(&network.graph, gain, trigger.floor(), (used + slowest).secs())
     });
     let heard = network.graphs.len() == 1 && mission.loses_by_switching_only();
     Some(TheoryRow {

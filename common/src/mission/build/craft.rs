@@ -3,8 +3,9 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::super::file::{
-    AuvModel, DerivativeChoice, DynamicUnicycle, FollowingChoice, FollowingType, MarineVehicle, ModelChoice,
-    Proposition31 as PropFile, Proposition33 as Prop33File, Theorem47 as TheoremFile,
+    ApproachChoice, ArctangentApproach, AuvModel, DerivativeChoice, DynamicUnicycle, FollowingChoice, FollowingType,
+    MarineVehicle, ModelChoice, Proposition31 as PropFile, Proposition33 as Prop33File, SenseChoice,
+    Theorem47 as TheoremFile,
 };
 use super::super::{Start, VehiclePlan};
 use crate::coordination::DemandKind;
@@ -18,7 +19,7 @@ use crate::following::decoupling_2_14::Decoupling;
 use crate::following::h2_figure_2_4::Disturbances;
 use crate::following::line_of_sight::LineOfSight;
 use crate::following::output_feedback_2_3::OutputFeedback;
-use crate::following::proposition_3_1::{Approach, Gains as RobotGains, Proposition31};
+use crate::following::proposition_3_1::{Approach, Gains as RobotGains, Proposition31, SenseOf};
 use crate::following::proposition_3_2::Proposition32;
 use crate::following::proposition_3_3::Proposition33;
 use crate::following::state_transformation_2_19::StateTransformation;
@@ -153,8 +154,25 @@ fn marine_gains(file: &Prop33File) -> RobotGains {
         k_1: file.k1,
         k_3: file.k3,
         k_4: file.k4,
-        approach: Approach::Arcsine { k_2: file.k2, epsilon_0: file.epsilon_m },
+        approach: approach(file.approach, file.k2, file.epsilon_m),
+        sense_of: sense_of(file.sense_of),
         ..RobotGains::default()
+    }
+}
+
+fn approach(choice: ApproachChoice, k_2: f64, epsilon_0: f64) -> Approach {
+    match choice {
+        ApproachChoice::Arcsine => Approach::Arcsine { k_2, epsilon_0 },
+        ApproachChoice::Arctangent(ArctangentApproach { psi_a_deg, length_m }) => {
+            Approach::Arctangent { psi_a: psi_a_deg.to_radians(), length: length_m }
+        }
+    }
+}
+
+fn sense_of(choice: SenseChoice) -> SenseOf {
+    match choice {
+        SenseChoice::ActualSpeed => SenseOf::ActualSpeed,
+        SenseChoice::DesiredSpeed => SenseOf::DesiredSpeed,
     }
 }
 
@@ -174,7 +192,8 @@ fn robot_gains(file: &PropFile) -> RobotGains {
         k_1: file.k1,
         k_3: file.k3,
         k_4: file.k4,
-        approach: Approach::Arcsine { k_2: file.k2, epsilon_0: file.epsilon_m },
+        approach: approach(file.approach, file.k2, file.epsilon_m),
+        sense_of: sense_of(file.sense_of),
         ..RobotGains::default()
     }
 }

@@ -9,6 +9,7 @@ use crate::coordination::decentralised_3_92::{Decentralised, Weighing};
 use crate::coordination::delayed_4_34::Delayed;
 use crate::coordination::delayed_4_42::DelayedAlone;
 use crate::coordination::delayed_4_42_estimating::Estimating;
+use crate::coordination::diagonal::Diagonal;
 use crate::coordination::directed_3_72::Directed;
 use crate::coordination::gateway_2_33::Gateway;
 use crate::coordination::introduction_1_5::Introduction;
@@ -71,6 +72,24 @@ pub(in crate::mission) fn law(choice: &LawChoice, ids: &[&str]) -> Result<Arc<dy
         LawChoice::DelayedEstimating(g) => Arc::new(Estimating::new(g.gain, g.time_constant_s)?),
         LawChoice::KnownDelay(g) => Arc::new(KnownDelay::new(g.gain, g.longest_s)?),
     })
+}
+
+/// The law of a fleet whose vehicles have these laws, which differ by gains alone.
+pub(in crate::mission) fn diagonal(choices: &[LawChoice], ids: &[&str]) -> Result<Arc<dyn FleetLaw>, String> {
+    let rows = choices.iter().map(|choice| law(choice, ids)).collect::<Result<Vec<_>, String>>()?;
+    Ok(Arc::new(Diagonal::new(rows)?))
+}
+
+/// The gains of which each vehicle may have its own, by their names: the entries of K, A and B.
+pub(in crate::mission) fn gains_by_vehicle(choice: &mut LawChoice) -> Vec<(&'static str, &mut f64)> {
+    match choice {
+        LawChoice::Introduction(g) | LawChoice::Switching(g) => vec![("gain", &mut g.gain)],
+        LawChoice::Solution1(g) => vec![("a", &mut g.a)],
+        LawChoice::Solution2(g) => vec![("a", &mut g.a), ("b", &mut g.b)],
+        LawChoice::Solution3(g) | LawChoice::MovingPattern(g) => vec![("a", &mut g.a), ("b", &mut g.b)],
+        LawChoice::Weighted(g) => vec![("a", &mut g.a), ("b", &mut g.b)],
+        _ => Vec::new(),
+    }
 }
 
 /// v_L* / v_L, as the law of a choice will make it.

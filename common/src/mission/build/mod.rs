@@ -6,5 +6,5 @@ mod law;
 mod path;
 
 pub(super) use craft::{auv, auv_gains, craft};
-pub(super) use law::{law, law_name, nominal_factor, told};
+pub(super) use law::{diagonal, gains_by_vehicle, law, law_name, nominal_factor, told};
 pub(super) use path::path;

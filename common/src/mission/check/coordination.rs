@@ -6,17 +6,18 @@ use std::sync::Arc;
 use super::super::Link;
 use super::super::build;
 use super::super::fault::Collector;
-use super::super::file::{Between, LawChoice, MissionFile};
+use super::super::file::{Between, LawChoice, MissionFile, OwnGains};
 use super::resolve;
 use crate::coordination::FleetLaw;
 use crate::coordination::known_delay::MOST_REMEMBERED;
 use crate::graph::Graph;
 
+/// The law of the fleet, and the same as each vehicle has it.
 pub(super) fn check_law(
     faults: &mut Collector<'_>,
     file: &MissionFile,
     ids: &HashMap<String, usize>,
-) -> Option<Arc<dyn FleetLaw>> {
+) -> Option<(Arc<dyn FleetLaw>, Vec<LawChoice>)> {
     let choice = &file.coordination.law;
     let (key, name) = ("coordination.law", build::law_name(choice));
     if let LawChoice::Introduction(_) | LawChoice::LeaderIntegral(_) = choice
@@ -51,12 +52,54 @@ pub(super) fn check_law(
     {
         law.delay_s = 0.0;
     }
-    match build::law(&choice, &in_order) {
-        Ok(law) => Some(law),
+    let law = match build::law(&choice, &in_order) {
+        Ok(law) => law,
         Err(reason) => {
             faults.fault(&format!("{key}.{name}"), reason, "gains above 0");
-            None
+            return None;
         }
+    };
+    if file.vehicles.iter().all(|vehicle| vehicle.gains.is_none()) {
+        return Some((law, vec![choice.clone(); file.vehicles.len()]));
+    }
+    let choices = check_own_gains(faults, file)?;
+    let law = build::diagonal(&choices, &in_order).map_err(|reason| faults.fault("vehicles", reason, "gains above 0"));
+    Some((law.ok()?, choices))
+}
+
+/// The law of each vehicle, with its own gains if it has some.
+fn check_own_gains(faults: &mut Collector<'_>, file: &MissionFile) -> Option<Vec<LawChoice>> {
+    let mut choices = vec![file.coordination.law.clone(); file.vehicles.len()];
+    let name = build::law_name(&file.coordination.law);
+    let mut sound = true;
+    for (i, (vehicle, choice)) in file.vehicles.iter().zip(&mut choices).enumerate() {
+        let Some(OwnGains { gain, a, b }) = vehicle.gains else { continue };
+        let mut places = build::gains_by_vehicle(choice);
+        for (own, value) in [("gain", gain), ("a", a), ("b", b)] {
+            let Some(value) = value else { continue };
+            let key = format!("vehicles[{i}].gains.{own}");
+            if let Some((_, place)) = places.iter_mut().find(|(known, _)| *known == own) {
+                **place = value;
+                faults.positive(&key, value, "");
+                sound &= value > 0.0;
+            } else {
+                let known: Vec<&str> = places.iter().map(|(known, _)| *known).collect();
+                let allowed = what_may_differ(&known, &file.coordination.law);
+                faults.fault(&key, format!("a gain of its own under {name}"), allowed);
+                sound = false;
+            }
+        }
+    }
+    sound.then_some(choices)
+}
+
+fn what_may_differ(known: &[&str], law: &LawChoice) -> String {
+    match (known, law) {
+        ([], LawChoice::Delayed(_) | LawChoice::DelayedWithLosses(_) | LawChoice::DelayedEstimating(_)) => {
+            "the same gain for every vehicle: with a delay, unequal ones leave an error (erratum 4.2)".into()
+        }
+        ([], _) => "the same gains for every vehicle under this law".into(),
+        (known, _) => known.join(", "),
     }
 }
 
@@ -187,7 +230,7 @@ mod tests {
             (include_str!("../../../../missions/thesis/eq-4-62-example-4-1.toml"), false),
         ] {
             let mission = Mission::parse("m.toml", text).unwrap_or_else(|faults| panic!("{faults}"));
-            assert_eq!(mission.law.says().is_some(), says, "{}", mission.name);
+            assert_eq!(mission.law.says(0).is_some(), says, "{}", mission.name);
         }
         assert!(Mission::parse("m", WEIGHTED).is_ok_and(|m| matches!(m.law_choice, LawChoice::Weighted(_))));
     }
@@ -225,6 +268,32 @@ mod tests {
         ] {
             let found = faults_with(text, old, new);
             assert!(found.iter().any(|line| line.contains(key) && line.contains(part)), "{new:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_may_have_gains_of_its_own_where_the_law_bears_it() {
+        let switching = include_str!("../../../../missions/thesis/ucm-one-link-at-a-time.toml");
+        let late = include_str!("../../../../missions/auv-helix.toml");
+        let second =
+            |text: &str, gains: &str| text.replacen("\n[[vehicles]]\n", &format!("\n[[vehicles]]\n{gains}\n"), 1);
+        let mission = Mission::parse("m", &second(switching, "gains = { gain = 0.7 }")).expect("sound");
+        let gains = mission.gains("gain");
+        assert!(gains[0] == 0.7 && gains[1] != 0.7 && !mission.has_equal_gains() && mission.gains("a").is_empty());
+        let mission = Mission::parse("m", &second(WEIGHTED, "gains = { a = 3.0 }")).expect("sound");
+        assert_eq!(mission.gains("a")[..2], [3.0, 1.0]);
+        assert!(mission.gains("b").iter().all(|b| *b == mission.gains("b")[0]) && !mission.has_equal_gains());
+        assert!(Mission::parse("m", WEIGHTED).is_ok_and(|mission| mission.has_equal_gains()));
+        for (text, gains, key, part) in [
+            (switching, "gains = { a = 0.7 }", "vehicles[0].gains.a", "under switching; allowed: gain"),
+            (switching, "gains = { gain = 0.0 }", "vehicles[0].gains.gain", "above 0"),
+            (switching, "gains = { k = 1.0 }", "vehicles[0].gains.k", "unknown key"),
+            (WEIGHTED, "gains = { b = nan }", "vehicles[0].gains.b", "above 0"),
+            (late, "gains = { gain = 0.2 }", "vehicles[0].gains.gain", "erratum 4.2"),
+            (TOLD, "gains = { a = 2.0 }", "vehicles[0].gains.a", "same gains for every vehicle"),
+        ] {
+            let faults = Mission::parse("m", &second(text, gains)).expect_err("refused").to_string();
+            assert!(faults.contains(key) && faults.contains(part), "{gains}: {faults}");
         }
     }
 

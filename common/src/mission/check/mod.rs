@@ -51,7 +51,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
     let times = check_times(faults, file);
     let speed = check_formation(faults, file);
     let ids = check_ids(faults, &file.vehicles);
-    let law = check_law(faults, file, &ids);
+    let (law, law_choices) = check_law(faults, file, &ids).unzip();
     let talk = check_talk(faults, file, law.as_deref());
     let network = with_preset(&file.network);
     let links = check_links(faults, file, &network, &ids);
@@ -81,6 +81,7 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         speed,
         law,
         law_choice: file.coordination.law.clone(),
+        law_choices: law_choices?,
         validity: file.coordination.validity_s.map(Span::from_secs),
         between: file.coordination.between,
         talk,

@@ -14,7 +14,7 @@ pub(super) fn check_talk(
 ) -> Option<Trigger> {
     let Talk::EventTriggered(talk) = &file.coordination.talk else { return None };
     let key = "coordination.talk.event_triggered";
-    if let Some(says) = law.and_then(FleetLaw::says) {
+    if let Some(says) = law.and_then(|law| (0..file.vehicles.len()).find_map(|i| law.says(i))) {
         let allowed = "periodic, or a law that needs nothing beside xi";
         faults.fault("coordination.talk", format!("event_triggered with a law that sends its {says}"), allowed);
     }

@@ -123,10 +123,23 @@ pub enum LawChoice {
     KnownDelay(KnownDelay),
 }
 
+/// Gains that a vehicle has for itself, in place of those of the coordination law and by the same names: its entries of the
+/// diagonal matrices K, A and B. Under introduction and switching `gain`; under solution1 `a`; under solution2,
+/// solution3, weighted and moving_pattern `a` and `b`. No other law bears gains that differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OwnGains {
+    /// k_i of (4.21) or a_i of (1.5), above 0 (1/s).
+    pub gain: Option<f64>,
+    /// a_i, above 0 (1/s).
+    pub a: Option<f64>,
+    /// b_i, above 0 (in the unit of the law's b).
+    pub b: Option<f64>,
+}
+
 /// One gain.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct GainOnly {
-    /// Coordination gain k (1/s).
+    /// Coordination gain k_i of every vehicle that has no own (1/s).
     pub gain: f64,
 }
 
@@ -222,25 +235,25 @@ pub struct SquareWave {
 /// Gains of (3.43).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Solution1 {
-    /// a_i, the same for all (1/s).
+    /// a_i of every vehicle that has no own (1/s).
     pub a: f64,
 }
 
 /// Gains of (3.44).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Solution2 {
-    /// a_i, the same for all (1/s).
+    /// a_i of every vehicle that has no own (1/s).
     pub a: f64,
-    /// b_i, the same for all (m²/s²).
+    /// b_i of every vehicle that has no own (m²/s²).
     pub b: f64,
 }
 
 /// Gains and weights of (3.62).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Weighted {
-    /// a_i, the same for all (1/s).
+    /// a_i of every vehicle that has no own (1/s).
     pub a: f64,
-    /// b_i, the same for all (m²/s²).
+    /// b_i of every vehicle that has no own (m²/s²).
     pub b: f64,
     /// Weights of links; a link that is not named has 1.
     #[serde(default)]
@@ -302,9 +315,9 @@ pub struct Auxiliary {
 /// Gains of (3.45).
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Solution3 {
-    /// a_i, the same for all (1/s).
+    /// a_i of every vehicle that has no own (1/s).
     pub a: f64,
-    /// b_i, the same for all (1/s).
+    /// b_i of every vehicle that has no own (1/s).
     pub b: f64,
     /// Saturation bound (m/s).
     pub x_m: f64,

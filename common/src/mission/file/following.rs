@@ -119,6 +119,43 @@ impl Default for StateTransformation {
     }
 }
 
+/// The angle at which a vehicle approaches its path, over its distance y from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ApproachChoice {
+    /// asin(k_2 y/(|y| + ε_0)), (3.13), of `k2` and `epsilon_m`.
+    #[default]
+    Arcsine,
+    /// (2ψ_a/π) atan(y/length), Appendix 6.1; `k2` and `epsilon_m` are not used.
+    Arctangent(ArctangentApproach),
+}
+
+/// The approach of Appendix 6.1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ArctangentApproach {
+    /// Steepest approach ψ_a, above 0 and at most 90 (deg).
+    pub psi_a_deg: f64,
+    /// Distance at which half of it is reached (m); 1 in the thesis.
+    #[serde(default = "one_metre")]
+    pub length_m: f64,
+}
+
+fn one_metre() -> f64 {
+    1.0
+}
+
+/// The speed whose sign is sign(v) of (3.13), with hysteresis (erratum 3.9).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SenseChoice {
+    /// That of the vehicle, as printed.
+    #[default]
+    ActualSpeed,
+    /// The one that is wanted of it: calmer where a transient carries the vehicle's through zero, but while the two have
+    /// different signs the vehicle moves away from its path.
+    DesiredSpeed,
+}
+
 /// Gains of Proposition 3.1.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -133,13 +170,26 @@ pub struct Proposition31 {
     pub k4: f64,
     /// Length ε_0 over which the approach angle builds up (m).
     pub epsilon_m: f64,
+    /// Shape of the approach angle.
+    pub approach: ApproachChoice,
+    /// Which speed decides whether the vehicle counts as going forward: sign(v) of (3.13).
+    pub sense_of: SenseChoice,
     /// Gain of the speed loop when the coordination law gives a rate (1/s).
     pub k_speed: f64,
 }
 
 impl Default for Proposition31 {
     fn default() -> Self {
-        Proposition31 { k1: 1.0, k2: 0.6, k3: 1.0, k4: 1.0, epsilon_m: 0.3, k_speed: 2.0 }
+        Proposition31 {
+            k1: 1.0,
+            k2: 0.6,
+            k3: 1.0,
+            k4: 1.0,
+            epsilon_m: 0.3,
+            approach: ApproachChoice::Arcsine,
+            sense_of: SenseChoice::ActualSpeed,
+            k_speed: 2.0,
+        }
     }
 }
 
@@ -157,6 +207,10 @@ pub struct Proposition33 {
     pub k4: f64,
     /// Length ε_0 over which the approach angle builds up (m).
     pub epsilon_m: f64,
+    /// Shape of the approach angle.
+    pub approach: ApproachChoice,
+    /// Which speed decides whether the vehicle counts as going forward: sign(v) of (3.13).
+    pub sense_of: SenseChoice,
     /// Gain of the speed loop when the coordination law gives a rate (1/s).
     pub k_speed: f64,
     /// Gain k_0 of the side-slip (1/s).
@@ -171,13 +225,15 @@ pub struct Proposition33 {
 
 impl Default for Proposition33 {
     fn default() -> Self {
-        let Proposition31 { k1, k2, k3, k4, epsilon_m, k_speed } = Proposition31::default();
+        let Proposition31 { k1, k2, k3, k4, epsilon_m, approach, sense_of, k_speed } = Proposition31::default();
         Proposition33 {
             k1,
             k2,
             k3,
             k4,
             epsilon_m,
+            approach,
+            sense_of,
             k_speed,
             k_slip: 1.0,
             slip_deg: 0.0,

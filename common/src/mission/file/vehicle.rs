@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{CurrentSection, FailureChoice, FollowingChoice, LimitsSection, NoiseSection, PathChoice};
+use super::{CurrentSection, FailureChoice, FollowingChoice, LimitsSection, NoiseSection, OwnGains, PathChoice};
 
 /// What all vehicles have in common; a vehicle may differ.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -36,6 +36,8 @@ pub struct VehicleSection {
     pub pattern: f64,
     /// How its place moves about `pattern`, for the law moving_pattern.
     pub pattern_motion: Option<PatternMotionSection>,
+    /// Its own coordination gains, where they are other than those of coordination.law.
+    pub gains: Option<OwnGains>,
     /// Its plant, if other than the fleet's.
     pub model: Option<ModelChoice>,
     /// Its path-following law, if other than the fleet's.
