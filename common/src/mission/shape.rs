@@ -1,8 +1,9 @@
 //! Compares a file with the schema of what it is read into, so that every unknown or missing key and every value of a
 //! wrong type is found at once, each with its line and what is allowed there.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Display;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use schemars::JsonSchema;
 use serde_json::Value;
@@ -13,19 +14,25 @@ use super::file::MissionFile;
 
 /// JSON schema of the mission file, for editors and for the check itself.
 pub fn schema() -> Value {
-    schema_of::<MissionFile>()
+    (*schema_of::<MissionFile>()).clone()
 }
 
-fn schema_of<T: JsonSchema>() -> Value {
-    let mut settings = schemars::generate::SchemaSettings::draft2020_12();
-    settings.inline_subschemas = true;
-    settings.into_generator().into_root_schema_for::<T>().to_value()
+/// The schema of `T`, made once: a sweep reads thousands of files of one kind, and making it takes longer than a short flight.
+fn schema_of<T: JsonSchema>() -> Arc<Value> {
+    static MADE: Mutex<BTreeMap<&str, Arc<Value>>> = Mutex::new(BTreeMap::new());
+    let make = || {
+        let mut settings = schemars::generate::SchemaSettings::draft2020_12();
+        settings.inline_subschemas = true;
+        Arc::new(settings.into_generator().into_root_schema_for::<T>().to_value())
+    };
+    let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+    made.entry(std::any::type_name::<T>()).or_insert_with(make).clone()
 }
 
 /// Notes every difference in shape between a file and the schema of `T`.
 pub(super) fn check_shape<T: JsonSchema>(faults: &mut Collector<'_>, root: &DeTable<'_>) -> Misfits {
-    let mut look = Look { faults, misfits: Misfits { schema: schema_of::<T>(), ..Misfits::default() } };
-    let schema = look.misfits.schema.clone();
+    let schema = schema_of::<T>();
+    let mut look = Look { faults, misfits: Misfits { schema: Arc::clone(&schema), ..Misfits::default() } };
     look.table(root, &schema, "");
     look.misfits
 }
@@ -33,7 +40,7 @@ pub(super) fn check_shape<T: JsonSchema>(faults: &mut Collector<'_>, root: &DeTa
 /// What of a file does not fit its schema.
 #[derive(Debug, Default)]
 pub(super) struct Misfits {
-    pub(super) schema: Value,
+    pub(super) schema: Arc<Value>,
     /// Keys whose values cannot be read.
     pub(super) unreadable: HashSet<String>,
     /// Keys that are missing.
