@@ -31,8 +31,8 @@ fn schema_of<T: JsonSchema>() -> Arc<Value> {
 
 /// Notes every difference in shape between a file and the schema of `T`.
 pub(super) fn check_shape<T: JsonSchema>(faults: &mut Collector<'_>, root: &DeTable<'_>) -> Misfits {
-    let mut look = Look { faults, misfits: Misfits { schema: schema_of::<T>(), ..Misfits::default() } };
-    let schema = Arc::clone(&look.misfits.schema);
+    let schema = schema_of::<T>();
+    let mut look = Look { faults, misfits: Misfits { schema: Arc::clone(&schema), ..Misfits::default() } };
     look.table(root, &schema, "");
     look.misfits
 }
