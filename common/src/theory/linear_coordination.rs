@@ -8,7 +8,8 @@
 //!
 //! as in (3.75). θ = 0 means agreement. With constant C its eigenvalues are the exact rates, whatever the graph.
 
-use nalgebra::{Complex, DMatrix, DVector};
+pub use nalgebra::Complex;
+use nalgebra::{DMatrix, DVector};
 
 use crate::graph::Graph;
 use crate::graph::incidence::Differences;
@@ -62,17 +63,26 @@ impl Law {
     /// Eigenvalues of the closed loop in (η, θ) on this graph, with R_i \[m per unit of ξ\] constant. `None` if the
     /// graph cannot agree, or something is not positive and finite.
     pub fn eigenvalues(self, graph: &Graph, r: &[f64]) -> Option<Vec<Complex<f64>>> {
+        self.late_eigenvalues(graph, &graph.laplacian(), r, 0.0)
+    }
+
+    /// The same with another matrix for L that is zero where L is, such as MWM' of (3.62), and for a law that acts `late` seconds late,
+    /// to first order in that: η' = u(t − τ) ≈ u − τu'. A law that is held for a control period is half of it late.
+    pub fn late_eigenvalues(self, graph: &Graph, l: &DMatrix<f64>, r: &[f64], late: f64) -> Option<Vec<Complex<f64>>> {
         let n = graph.len();
-        if r.len() != n || !r.iter().all(|&r| r > 0.0 && r.is_finite()) {
+        if r.len() != n || l.shape() != (n, n) || !r.iter().all(|&r| r > 0.0 && r.is_finite()) {
             return None;
         }
         let c = DVector::from_iterator(n, r.iter().map(|r| 1.0 / r));
         let split = Differences::of(graph)?;
-        let (e, g) = self.matrices(&c, &graph.laplacian());
+        let (e, g) = self.matrices(&c, l);
+        let (pull, way) = (g * &split.f_1, &split.f_2 * DMatrix::from_diagonal(&c));
+        // (I − τE)η' = −Eη − GF_1(θ − τθ')
+        let lead = (DMatrix::identity(n, n) - &e * late).try_inverse()?;
         let mut closed = DMatrix::zeros(2 * n - 1, 2 * n - 1);
-        closed.view_mut((0, 0), (n, n)).copy_from(&-e);
-        closed.view_mut((0, n), (n, n - 1)).copy_from(&-(g * &split.f_1));
-        closed.view_mut((n, 0), (n - 1, n)).copy_from(&(&split.f_2 * DMatrix::from_diagonal(&c)));
+        closed.view_mut((0, 0), (n, n)).copy_from(&(&lead * (&pull * &way * late - e)));
+        closed.view_mut((0, n), (n, n - 1)).copy_from(&-(lead * pull));
+        closed.view_mut((n, 0), (n - 1, n)).copy_from(&way);
         eigenvalues(&closed)
     }
 
@@ -134,6 +144,18 @@ pub(crate) mod tests {
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&Graph::empty(2), &[1.0; 2]), None);
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0]), None);
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_late_law_is_slower_as_the_exact_delay_says() {
+        // One vehicle pair, solution II with R = 1: the difference obeys s² + (as + 2b)e^(−sτ) = 0.
+        let (law, pair, tau) = (Law::SolutionTwo { a: 1.0, b: 0.4 }, Graph::complete(2), 0.01);
+        let late = law.late_eigenvalues(&pair, &pair.laplacian(), &[1.0; 2], tau).expect("connected");
+        let residual = |s: &Complex<f64>| (s * s + (s * 1.0 + 0.8) * (-s * tau).exp()).norm();
+        let pair_of_modes: Vec<_> = late.iter().filter(|mode| mode.im != 0.0).collect();
+        assert!(pair_of_modes.len() == 2 && pair_of_modes.iter().all(|mode| residual(mode) < 1e-4), "{late:?}");
+        let prompt = law.rate(&pair, &[1.0; 2]).expect("connected");
+        assert!((prompt - 0.5).abs() < 1e-12 && pair_of_modes[0].re > -prompt + 1e-3);
     }
 
     proptest! {

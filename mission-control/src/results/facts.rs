@@ -1,6 +1,11 @@
 //! What the caller knows of a mission and the results need: names, patterns, predictions.
 
+use std::sync::Arc;
+
 use common::mission::Pattern;
+use common::path::Path;
+
+use super::GraphFacts;
 
 /// What is known of a run without looking at its recording.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,6 +40,23 @@ pub struct Facts {
     pub xi_unit: String,
     /// Whether the paths leave the plane; chooses the figures.
     pub spatial: bool,
+    /// Who can hear whom, and what follows from it.
+    pub graph: Option<GraphFacts>,
+}
+
+/// The path whose R = ds/dξ turns a vehicle's speed into the rate of its coordination state, for a vehicle whose target goes where the
+/// vehicle goes: d = ξ̇ − v/R (3.36) is then what path following does to coordination.
+#[derive(Clone, Debug, Default)]
+pub struct Way(pub Option<Arc<dyn Path>>);
+
+/// The same path, not one like it.
+impl PartialEq for Way {
+    fn eq(&self, other: &Way) -> bool {
+        match (&self.0, &other.0) {
+            (Some(one), Some(two)) => Arc::ptr_eq(one, two),
+            (one, two) => one.is_none() && two.is_none(),
+        }
+    }
 }
 
 /// What is known of one vehicle.
@@ -48,6 +70,8 @@ pub struct VehicleFacts {
     pub path: String,
     /// The path as planned \[m\], for the figures; may be empty.
     pub planned: Vec<[f64; 3]>,
+    /// Its path, where its speed is what coordination commands.
+    pub way: Way,
     /// Size of one of its messages \[bytes\], if not the fleet's.
     pub message_bytes: Option<u64>,
 }

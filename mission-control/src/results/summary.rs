@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use bus::recording::Recording;
-use common::record::{ClockRecord, Record, StateRow};
+use common::record::{ClockRecord, Record, SpeedRow, StateRow};
 use common::time::Time;
 use serde::Serialize;
 
 use super::Facts;
 use super::network::{Connectivity, LinkSummary, Network, Spread, links, transmissions};
 use super::series::{Coordination, Track, speeds, tracks};
-use super::statistics::{ExponentialFit, fit_exponential, largest, mean, rms, settling_time, steady_from};
+use super::statistics::{ExponentialFit, FIT_PART, fit_coordination, largest, mean, rms, settling_time, steady_from};
 
 /// A fleet counts as coordinated when its largest difference stays below this \[units of ξ\].
 pub(super) const COORDINATION_THRESHOLD: f64 = 1e-2;
@@ -88,7 +88,8 @@ pub struct CoordinationSummary {
     pub fit: Option<ExponentialFit>,
     /// The rate that theory guarantees for that norm \[1/s\].
     pub guaranteed_rate: Option<f64>,
-    /// Whether the fitted rate is at least the guaranteed one; `None` if one of them is not known.
+    /// Whether the fitted rate is at least the guaranteed one, to two parts in a hundred; `None` if one of them is not known, or
+    /// vehicles were not on their paths while the error decayed.
     pub at_least_guaranteed: Option<bool>,
     /// The error over time.
     pub series: CoordinationSeries,
@@ -261,7 +262,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         on_path_s: present().map(|vehicle| vehicle.on_path_s).collect::<Option<Vec<f64>>>().map(largest),
         messages: totals(&links, &said, facts),
         connectivity: network.connectivity(facts),
-        coordination: coordination_summary(&coordination, facts),
+        coordination: coordination_summary(&coordination, facts, last_change(&speeds(exact), facts.duration_s)),
     };
     let warnings = warnings(recording, &vehicles, &links);
     Summary {
@@ -321,10 +322,17 @@ pub fn summarise_clock(recording: &Recording) -> ClockSummary {
     summary
 }
 
-fn coordination_summary(coordination: &Coordination, facts: &Facts) -> CoordinationSummary {
+/// When the formation speed changed for the last time under way \[s\]; zero if it never did.
+fn last_change(speeds: &[&SpeedRow], end_s: f64) -> f64 {
+    let changes = speeds.windows(2).filter(|pair| pair[0].speed != pair[1].speed);
+    changes.map(|pair| pair[1].t_ns as f64 / 1e9).filter(|t_s| *t_s < end_s).fold(0.0, f64::max)
+}
+
+fn coordination_summary(coordination: &Coordination, facts: &Facts, last_speed_s: f64) -> CoordinationSummary {
     let (t_s, spread, norm) = (&coordination.t_s, coordination.spread(), coordination.norm());
     let peak = largest(spread.iter().copied());
-    let fit = fit_exponential(t_s, &norm, facts.link_period_s);
+    let fit = fit_coordination(t_s, &norm, coordination.disturbance.as_deref(), last_speed_s, facts.link_period_s);
+    let comparable = fit.filter(|fit| fit.on_paths).zip(facts.guaranteed_rate);
     let kept = thinned(t_s.len(), SERIES_SAMPLES);
     let pick = |values: &[f64]| kept.iter().map(|index| values[*index]).collect();
     let steady = steady_part(t_s, facts);
@@ -338,7 +346,7 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts) -> Coordinat
         settled_absolute_s: settling_time(t_s, &spread, COORDINATION_THRESHOLD),
         fit,
         guaranteed_rate: facts.guaranteed_rate,
-        at_least_guaranteed: fit.zip(facts.guaranteed_rate).map(|(fit, guaranteed)| fit.rate >= guaranteed),
+        at_least_guaranteed: comparable.map(|(fit, guaranteed)| fit.rate >= (1.0 - FIT_PART) * guaranteed),
         series: CoordinationSeries { t_s: pick(t_s), largest: pick(&spread), norm: pick(&norm) },
     }
 }

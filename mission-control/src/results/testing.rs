@@ -38,6 +38,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         id: format!("v{}", index + 1),
         pattern: Pattern::default(),
         path: if spatial { format!("helix-{}", index + 1) } else { format!("circle-{}", index + 1) },
+        way: Default::default(),
         message_bytes: (index == 2).then_some(44),
         planned: (0..=200).map(|step| path(f64::from(step) * 2.0, index, spatial)).collect(),
     });
@@ -58,6 +59,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         symbol: if spatial { "γ".into() } else { "ξ".into() },
         xi_unit: String::new(),
         spatial,
+        graph: None,
     }
 }
 
