@@ -14,9 +14,10 @@ use crate::results::TheoryRow;
 /// (2.29): each follower has the roots of s³ + as² + bs + c. With path following by the decoupling method, (2.37).
 pub(super) fn rows_of_a_leader(case: &Case<'_>, law: &LeaderFollower) -> Vec<TheoryRow> {
     let mode = slowest(&[1.0, law.a, law.b, law.c]).filter(|(rate, _)| *rate > 0.0);
-    let followers = case.mission.vehicles.iter().enumerate().filter(|(_, plan)| plan.id != law.leader);
+    let leads = |id: &str| id == law.leader;
+    let followers = || case.mission.vehicles.iter().enumerate().filter(|(_, plan)| !leads(&plan.id));
     // The one that turns fastest is the one closest to the border.
-    let turning = followers.filter_map(|(index, plan)| Some((lambda_p(plan)?, turning(case.mission, index))));
+    let turning = followers().filter_map(|(index, plan)| Some((lambda_p(plan)?, turning(case.mission, index))));
     let coupled = turning.max_by(|(_, one), (_, two)| one.total_cmp(two));
     let alone = Verdict {
         name: "followers (2.29)",
@@ -30,19 +31,28 @@ pub(super) fn rows_of_a_leader(case: &Case<'_>, law: &LeaderFollower) -> Vec<The
         holds: law.a * law.b > law.c && hear(case, &law.leader),
         norm_rate: mode.map(|(rate, _)| rate),
     };
-    let stuck = stuck_at_the_end(case.mission);
-    // In line with a leader that is stuck, at its speed (2.41): the followers do not know that it failed.
-    let leader_alone = matches!(&stuck[..], &[(failed, _)] if case.mission.index_of(&law.leader) == Some(failed));
-    let mut alone = row(case, alone, leader_alone);
+    // In line with a leader that is stuck, at its speed (2.41): the followers do not know that it failed. And nobody minds a follower.
+    let fails = |plan: &VehiclePlan| plan.disturbances.stuck.is_some_and(|stuck| stuck.from < case.mission.end);
+    let to_the_end = stuck_at_the_end(case.mission).into_iter().any(|(index, _)| leads(case.mission.vehicles[index].id.as_str()));
+    let steady = to_the_end || !case.mission.vehicles.iter().any(|plan| leads(&plan.id) && fails(plan));
+    let stuck: Vec<&str> = followers().map(|(_, plan)| plan).filter(|plan| fails(plan)).map(|plan| plan.id.as_str()).collect();
+    let said = |row: TheoryRow| match stuck.is_empty() {
+        true => row,
+        false => TheoryRow {
+            value: format!("{}; said of the others than {}", row.value, stuck.join(", ")),
+            guaranteed_rate: None,
+            ..row
+        },
+    };
+    let mut alone = row(case, alone, steady);
     if let Some(mode) = mode.filter(|(_, times)| *times > 1).filter(|_| alone.guaranteed_rate.is_some()) {
         alone = TheoryRow { predicted: mode_words(mode), guaranteed_rate: None, ..alone };
     }
-    alone = alone_of(case, alone);
-    let mut rows = vec![alone];
+    let mut rows = vec![said(alone_of(case, alone))];
     if let Some((lambda_p, turning)) = coupled {
         let mut verdict = decoupling_2_37::verdict(lambda_p, law.a1, [law.a, law.b, law.c], turning);
         verdict.holds &= hear(case, &law.leader);
-        rows.push(row(case, verdict, leader_alone));
+        rows.push(said(row(case, verdict, steady)));
     }
     rows
 }

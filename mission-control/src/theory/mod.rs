@@ -43,7 +43,7 @@ mod weights_and_patterns;
 use common::mission::Mission;
 use common::mission::file::LawChoice;
 use common::theory::Verdict;
-use common::theory::linear_coordination::Law;
+use common::theory::linear_coordination::{Late, Law};
 
 pub use figures::figures;
 pub use fleet::predicted_speed;
@@ -122,7 +122,7 @@ impl<'a> Case<'a> {
         if fit.rate >= least(guaranteed) {
             return row;
         }
-        let measured = match solutions::late_rate(self, 1.5 * period).filter(|late| fit.rate >= least(*late)) {
+        let measured = match solutions::late_rate(self, Late::held(period)).filter(|late| fit.rate >= least(*late)) {
             Some(late) => format!("{}; held for {period} s the law reaches {late:.5} 1/s", row.measured),
             None => format!("{}: {BELOW}", row.measured),
         };

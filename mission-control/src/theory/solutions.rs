@@ -1,7 +1,7 @@
 //! Solutions I to III of section 3.3: fixed networks, paths whose R_i may vary.
 
 use common::mission::file::LawChoice;
-use common::theory::linear_coordination::{Complex, Law};
+use common::theory::linear_coordination::{Complex, Late, Law};
 use common::theory::{proposition_3_4, proposition_3_8};
 
 use super::{Case, directed, weights_and_patterns};
@@ -29,7 +29,7 @@ pub(super) fn bounded_speeds(case: &Case<'_>, a: f64) -> TheoryRow {
 }
 
 /// The rate of the slowest mode of a law of chapter 3 that acts so late, where R_i is constant \[1/s\].
-pub(super) fn late_rate(case: &Case<'_>, late: f64) -> Option<f64> {
+pub(super) fn late_rate(case: &Case<'_>, late: Late) -> Option<f64> {
     let (graph, r) = (&case.network.graph, case.way.constant()?);
     let law = match &case.mission.law_choice {
         LawChoice::Solution1(law) => Law::SolutionOne { a: law.a },
@@ -37,7 +37,7 @@ pub(super) fn late_rate(case: &Case<'_>, late: f64) -> Option<f64> {
         LawChoice::Solution3(law) | LawChoice::MovingPattern(law) => Law::SolutionThree { a: law.a, b: law.b },
         LawChoice::Directed(law) => Law::Directed { a: law.a, b: law.b },
         LawChoice::Weighted(law) => return weights_and_patterns::rate(case, law, late),
-        LawChoice::TrulyDecentralised(law) => return directed::late_rate(case, law, late),
+        LawChoice::TrulyDecentralised(law) => return directed::late_rate(case, law, late.neighbours),
         _ => return None,
     };
     slowest(&law.late_eigenvalues(graph, &graph.laplacian(), r, late)?)

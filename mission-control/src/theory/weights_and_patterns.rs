@@ -1,7 +1,7 @@
 //! Solution II with weighted links, and solution III about a pattern that moves.
 
 use common::mission::file::{LinkWeight, Solution3, Weighted};
-use common::theory::linear_coordination::Law;
+use common::theory::linear_coordination::{Late, Law};
 use common::theory::proposition_3_4::{PathRates, rate_for_varying_paths};
 
 use super::Case;
@@ -11,12 +11,12 @@ use crate::results::TheoryRow;
 /// (3.62): Remark 3.10 speaks of constant C; the eigenvalues of its closed loop are the exact rate.
 pub(super) fn rows_of_weights(case: &Case<'_>, law: &Weighted) -> Vec<TheoryRow> {
     let name = "Agreement with weighted links (Proposition 3.4, Remark 3.10)";
-    let rate = rate(case, law, 0.0);
+    let rate = rate(case, law, Late::default());
     vec![row(case, name, "constant R_i; ", case.way.constant().is_some(), rate)]
 }
 
 /// The rate of (3.62) where R_i is constant, if the law acts so late \[1/s\].
-pub(super) fn rate(case: &Case<'_>, law: &Weighted, late: f64) -> Option<f64> {
+pub(super) fn rate(case: &Case<'_>, law: &Weighted, late: Late) -> Option<f64> {
     let ends = |entry: &LinkWeight| entry.link.each_ref().map(|id| case.mission.index_of(id));
     let weight = |i: usize, j: usize| {
         let named = law.weights.iter().find(|entry| [[Some(i), Some(j)], [Some(j), Some(i)]].contains(&ends(entry)));
