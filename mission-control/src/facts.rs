@@ -25,6 +25,7 @@ pub fn facts(mission: &Mission) -> Facts {
         control_period_s: mission.control_period.secs(),
         link_period_s: file.as_ref().and_then(period_of),
         guaranteed_rate: guarantee.map(|g| g.rate),
+        least_rate: theory::least_rate(mission),
         guaranteed_factor: guarantee.and_then(|g| g.factor),
         predicted_speed: theory::predicted_speed(mission),
         predicted_along_bias_m: mission.predicted_along_bias(0),

@@ -28,6 +28,8 @@ pub struct Facts {
     pub link_period_s: Option<f64>,
     /// The rate at which theory guarantees that the norm of the coordination error decays \[1/s\].
     pub guaranteed_rate: Option<f64>,
+    /// What is left of it by the law's being held for a control period, where that is less \[1/s\].
+    pub least_rate: Option<f64>,
     /// The factor c of the guarantee ‖e(t)‖ ≤ c·exp(−rate·t)·‖e(0)‖; the envelope is drawn where it is known.
     pub guaranteed_factor: Option<f64>,
     /// The formation speed that theory predicts for the fleet \[units of ξ per s\].

@@ -112,7 +112,8 @@ impl GraphFacts {
             (false, true) => "one-way links, joined if directions are left aside",
             (false, false) => "one-way links, in parts",
         };
-        let heard = if self.globally_reachable.is_empty() { "nobody".into() } else { self.globally_reachable.join(", ") };
+        let heard =
+            if self.globally_reachable.is_empty() { "nobody".into() } else { self.globally_reachable.join(", ") };
         let taken = &self.taken;
         vec![
             ("links", kind.into()),

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::drawing::{GRID, INK, PAPER};
-use super::summary::PATH_THRESHOLD_M;
 use super::graph::printed;
+use super::summary::PATH_THRESHOLD_M;
 use super::{ClockSummary, Facts, Figure, GraphFacts, LinkSummary, Summary, VehicleSummary};
 
 /// A line of the table "theory beside measurement".
@@ -199,7 +199,8 @@ fn graph(page: &mut String, graph: Option<&GraphFacts>) {
         let order = escape(&graph.vehicles.join(", "));
         let _ = writeln!(page, "<details><summary>Matrices, rows and columns in the order {order}</summary>");
         for (name, matrix) in matrices {
-            let _ = writeln!(page, "<p class=\"remark\">{}</p>\n<pre>{}</pre>", escape(name), printed(matrix).join("\n"));
+            let _ =
+                writeln!(page, "<p class=\"remark\">{}</p>\n<pre>{}</pre>", escape(name), printed(matrix).join("\n"));
         }
         page.push_str("</details>\n");
     }

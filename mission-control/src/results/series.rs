@@ -4,8 +4,8 @@ use common::mission::Pattern;
 use common::record::{Record, SpeedRow, StateRow};
 use common::time::Time;
 
-use super::{Facts, Way};
 use super::statistics::mean;
+use super::{Facts, Way};
 
 /// The rows of one vehicle in order of time.
 #[derive(Clone, Debug)]
@@ -214,9 +214,8 @@ mod tests {
         let mut facts = facts();
         let circle = common::path::line::Line::new(Default::default(), 0.0, 2.0).expect("a line");
         facts.vehicles[0].way = Way(Some(std::sync::Arc::new(circle)));
-        let row = |id: &str, xi_rate, speed_mps| {
-            Record::State(StateRow { xi_rate, speed_mps, ..state_row(0, id, 0.0) })
-        };
+        let row =
+            |id: &str, xi_rate, speed_mps| Record::State(StateRow { xi_rate, speed_mps, ..state_row(0, id, 0.0) });
         // R = 2: 0.6 m/s make 0.3, and ξ goes at 0.5; the other target moves as told.
         let coordination = Coordination::of(&tracks(&[row("a", 0.5, 0.6), row("b", 0.9, 0.0)], &facts), &facts);
         let d = coordination.disturbance.expect("one vehicle goes along");

@@ -88,7 +88,8 @@ pub struct CoordinationSummary {
     pub fit: Option<ExponentialFit>,
     /// The rate that theory guarantees for that norm \[1/s\].
     pub guaranteed_rate: Option<f64>,
-    /// Whether the fitted rate is at least the guaranteed one, to two parts in a hundred; `None` if one of them is not known, or
+    /// Whether the fitted rate is at least the guaranteed one, to two parts in a hundred and as far as a law that is held for a control
+    /// period reaches it; `None` if one of them is not known, or
     /// vehicles were not on their paths while the error decayed.
     pub at_least_guaranteed: Option<bool>,
     /// The error over time.
@@ -332,7 +333,7 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts, last_speed_s
     let (t_s, spread, norm) = (&coordination.t_s, coordination.spread(), coordination.norm());
     let peak = largest(spread.iter().copied());
     let fit = fit_coordination(t_s, &norm, coordination.disturbance.as_deref(), last_speed_s, facts.link_period_s);
-    let comparable = fit.filter(|fit| fit.on_paths).zip(facts.guaranteed_rate);
+    let comparable = fit.filter(|fit| fit.on_paths).zip(facts.least_rate.or(facts.guaranteed_rate));
     let kept = thinned(t_s.len(), SERIES_SAMPLES);
     let pick = |values: &[f64]| kept.iter().map(|index| values[*index]).collect();
     let steady = steady_part(t_s, facts);
@@ -346,7 +347,7 @@ fn coordination_summary(coordination: &Coordination, facts: &Facts, last_speed_s
         settled_absolute_s: settling_time(t_s, &spread, COORDINATION_THRESHOLD),
         fit,
         guaranteed_rate: facts.guaranteed_rate,
-        at_least_guaranteed: comparable.map(|(fit, guaranteed)| fit.rate >= (1.0 - FIT_PART) * guaranteed),
+        at_least_guaranteed: comparable.map(|(fit, least)| fit.rate >= (1.0 - FIT_PART) * least),
         series: CoordinationSeries { t_s: pick(t_s), largest: pick(&spread), norm: pick(&norm) },
     }
 }

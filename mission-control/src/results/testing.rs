@@ -53,6 +53,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         control_period_s: 0.1,
         link_period_s: Some(10.0),
         guaranteed_rate: Some(0.012),
+        least_rate: None,
         guaranteed_factor: Some(1.3),
         predicted_speed: Some(0.5),
         predicted_along_bias_m: Some(0.0),

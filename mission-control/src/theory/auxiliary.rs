@@ -36,9 +36,9 @@ pub(super) fn rows_fixed(case: &Case<'_>, law: &Auxiliary) -> Vec<TheoryRow> {
         ),
         holds: Some(fixed && graph.is_undirected() && graph.is_connected()),
         // α₂ does not vanish while δ ≠ 0: what decays is the distance from where it leads, so that no rate is guaranteed for e.
-        predicted: rate.filter(|_| fixed).map_or("–".into(), |rate| {
-            format!("slowest mode {rate:.5} 1/s, down to the ball that α₂ leaves")
-        }),
+        predicted: rate
+            .filter(|_| fixed)
+            .map_or("–".into(), |rate| format!("slowest mode {rate:.5} 1/s, down to the ball that α₂ leaves")),
         guaranteed_rate: None,
         measured: case.fitted_rate(),
     }]

@@ -73,7 +73,9 @@ fn eigenvalues(mission: &Mission, network: &Network) -> Option<Figure> {
         _ => return None,
     };
     let (graph, whose) = match &mission.law_choice {
-        LawChoice::TrulyDecentralised(law) => (with_leader(mission, &network.graph, law)?, "the graph with the virtual leader"),
+        LawChoice::TrulyDecentralised(law) => {
+            (with_leader(mission, &network.graph, law)?, "the graph with the virtual leader")
+        }
         _ => (network.graph.clone(), "the graph of all links"),
     };
     let mu = nonzero_spectrum(&graph, normalised)?;
@@ -82,7 +84,11 @@ fn eigenvalues(mission: &Mission, network: &Network) -> Option<Figure> {
     let reach = mu.iter().map(|mu| mu.re.max(mu.im.abs())).fold(0.0, f64::max).max(1.0) * 1.3;
     let border = law.border(ratio, reach, 200);
     let mirrored = border.iter().rev().map(|(re, im)| (*re, -im)).chain(border.iter().copied()).collect();
-    let verdict = if ratio > threshold { "all are to the right of it, and it holds" } else { "not all are to the right of it, and it does not hold" };
+    let verdict = if ratio > threshold {
+        "all are to the right of it, and it holds"
+    } else {
+        "not all are to the right of it, and it does not hold"
+    };
     let shape = match law {
         DirectedLaw::OverC => "Im² = (a²/b) Re",
         DirectedLaw::TimesC(_) => "c² Im² = (a²/b) Re",

@@ -70,9 +70,11 @@ pub(super) fn spectrum(case: &Case<'_>) -> Option<TheoryRow> {
 pub(super) fn excused(row: TheoryRow, statements: &[TheoryRow]) -> TheoryRow {
     let covers = statements.iter().find(|statement| statement.holds == Some(true));
     match covers.filter(|_| row.holds == Some(false)) {
-        Some(covers) => {
-            TheoryRow { value: format!("{}; not needed: {} covers the mission", row.value, covers.name), holds: None, ..row }
-        }
+        Some(covers) => TheoryRow {
+            value: format!("{}; not needed: {} covers the mission", row.value, covers.name),
+            holds: None,
+            ..row
+        },
         None => row,
     }
 }
@@ -115,9 +117,9 @@ pub fn predicted_speed(mission: &Mission) -> Option<f64> {
     match travels(mission) {
         Travel::Nowhere => None,
         Travel::With(_, rate) if moves_as_told(mission) || disturbed.only_failures() => Some(rate),
-        Travel::Told if moves_as_told(mission) || disturbed.is_empty() => mission
-            .excited_speed()
-            .or_else(|| Some(speed_factor(mission)? * mission.speed.at(mission.end).v_l)),
+        Travel::Told if moves_as_told(mission) || disturbed.is_empty() => {
+            mission.excited_speed().or_else(|| Some(speed_factor(mission)? * mission.speed.at(mission.end).v_l))
+        }
         _ => None,
     }
 }
@@ -193,7 +195,8 @@ pub(super) fn bias(case: &Case<'_>) -> Option<TheoryRow> {
     let holds = case.disturbances.is_empty() && tightest.is_some_and(|(size, least)| size > least);
     Some(TheoryRow {
         name: "Along-path bias left by δ (Theorem 4.7, erratum 4.12)".into(),
-        condition: "δ₁ < 0, |δ₁| > |v_n| |p'| max|m_ii − m₁₁|/m₁₁, so that the matrix B keeps its rank; undisturbed".into(),
+        condition: "δ₁ < 0, |δ₁| > |v_n| |p'| max|m_ii − m₁₁|/m₁₁, so that the matrix B keeps its rank; undisturbed"
+            .into(),
         value: format!(
             "{}{}",
             tightest.map_or("–".into(), |(size, least)| format!("|δ₁| = {size} > {least:.4} m/s")),

@@ -33,9 +33,11 @@ pub(super) fn rows_of_a_leader(case: &Case<'_>, law: &LeaderFollower) -> Vec<The
     };
     // In line with a leader that is stuck, at its speed (2.41): the followers do not know that it failed. And nobody minds a follower.
     let fails = |plan: &VehiclePlan| plan.disturbances.stuck.is_some_and(|stuck| stuck.from < case.mission.end);
-    let to_the_end = stuck_at_the_end(case.mission).into_iter().any(|(index, _)| leads(case.mission.vehicles[index].id.as_str()));
+    let to_the_end =
+        stuck_at_the_end(case.mission).into_iter().any(|(index, _)| leads(case.mission.vehicles[index].id.as_str()));
     let steady = to_the_end || !case.mission.vehicles.iter().any(|plan| leads(&plan.id) && fails(plan));
-    let stuck: Vec<&str> = followers().map(|(_, plan)| plan).filter(|plan| fails(plan)).map(|plan| plan.id.as_str()).collect();
+    let stuck: Vec<&str> =
+        followers().map(|(_, plan)| plan).filter(|plan| fails(plan)).map(|plan| plan.id.as_str()).collect();
     let said = |row: TheoryRow| match stuck.is_empty() {
         true => row,
         false => TheoryRow {
@@ -136,9 +138,9 @@ pub(super) fn rows_of_a_gateway(
 /// Whether everybody talks with the gateway, both ways.
 fn star(case: &Case<'_>, gateway: &str) -> bool {
     let graph = &case.network.graph;
-    case.mission.index_of(gateway).is_some_and(|hub| {
-        (0..graph.len()).all(|i| i == hub || (graph.hears(i, hub) && graph.hears(hub, i)))
-    })
+    case.mission
+        .index_of(gateway)
+        .is_some_and(|hub| (0..graph.len()).all(|i| i == hub || (graph.hears(i, hub) && graph.hears(hub, i))))
 }
 
 /// Neighbours in a row: result x of docs/errata.md.
@@ -184,7 +186,10 @@ fn row(case: &Case<'_>, verdict: Verdict, about_failures: bool) -> TheoryRow {
     let rate = verdict.norm_rate.filter(|_| holds);
     let row = TheoryRow {
         name: format!("Agreement ({})", verdict.name),
-        condition: format!("fixed network, no delay, no loss; circles or lines, close to the paths; {}", verdict.condition),
+        condition: format!(
+            "fixed network, no delay, no loss; circles or lines, close to the paths; {}",
+            verdict.condition
+        ),
         value: format!(
             "{}{}{}",
             verdict.value,

@@ -117,16 +117,23 @@ impl<'a> Case<'a> {
     fn judged(&self, row: TheoryRow) -> TheoryRow {
         let fit = self.summary.and_then(|s| s.fleet.coordination.fit).filter(|fit| fit.on_paths);
         let (Some(fit), Some(guaranteed), Some(true)) = (fit, row.guaranteed_rate, row.holds) else { return row };
-        let period = self.mission.control_period.secs();
         let least = |rate: f64| (1.0 - FIT_PART) * rate;
         if fit.rate >= least(guaranteed) {
             return row;
         }
-        let measured = match solutions::late_rate(self, Late::held(period)).filter(|late| fit.rate >= least(*late)) {
-            Some(late) => format!("{}; held for {period} s the law reaches {late:.5} 1/s", row.measured),
+        let measured = match self.held_rate().filter(|held| fit.rate >= least(*held)) {
+            Some(held) => {
+                let period = self.mission.control_period;
+                format!("{}; held for {period} the law reaches {held:.5} 1/s", row.measured)
+            }
             None => format!("{}: {BELOW}", row.measured),
         };
         TheoryRow { measured, ..row }
+    }
+
+    /// What is left of the rate of a law that is held for a control period, where that is known.
+    fn held_rate(&self) -> Option<f64> {
+        solutions::late_rate(self, Late::held(self.mission.control_period.secs()))
     }
 }
 
@@ -141,6 +148,13 @@ fn mode_words((rate, times): (f64, usize)) -> String {
 /// What theory guarantees for the coordination error of this mission, if it speaks about it.
 pub fn guarantee(mission: &Mission) -> Option<Guarantee> {
     guarantee_of(&Case::new(mission, None))
+}
+
+/// The least rate that a flight can show although what is guaranteed is kept: the law is held for a control period.
+pub fn least_rate(mission: &Mission) -> Option<f64> {
+    let case = Case::new(mission, None);
+    let rate = guarantee_of(&case)?.rate;
+    Some(case.held_rate().map_or(rate, |held| held.min(rate)))
 }
 
 fn guarantee_of(case: &Case<'_>) -> Option<Guarantee> {

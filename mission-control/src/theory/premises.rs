@@ -86,7 +86,8 @@ fn is_trimmed(vehicle: &VehiclePlan, xi: &[f64]) -> bool {
         let (a, b) = (vehicle.path.at(pair[0]), vehicle.path.at(pair[1]));
         // Derivatives of circles are right to some digits less than the numbers that made them.
         let same = |a: f64, b: f64| (a - b).abs() <= 1e3 * SAME * a.abs().max(b.abs()).max(1e-6);
-        joints.iter().any(|joint| (low..=high).contains(joint)) || (same(a.r(), b.r()) && same(a.curvature(), b.curvature()))
+        joints.iter().any(|joint| (low..=high).contains(joint))
+            || (same(a.r(), b.r()) && same(a.curvature(), b.curvature()))
     })
 }
 

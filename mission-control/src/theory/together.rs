@@ -16,7 +16,9 @@ pub(super) fn path_following(case: &Case<'_>) -> Option<TheoryRow> {
         name: "Path following (Propositions 3.1 to 3.3, conditions i and ii)".into(),
         condition: "speeds do not tend to zero: v_L ≠ 0 in the end".into(),
         value: match since {
-            Some(step) => format!("v_L = 0 from {} s on: vehicles may stop beside their paths", step.at.secs().max(0.0)),
+            Some(step) => {
+                format!("v_L = 0 from {} s on: vehicles may stop beside their paths", step.at.secs().max(0.0))
+            }
             None => format!("v_L = {v_l:.4}"),
         },
         holds: Some(v_l != 0.0),
@@ -51,10 +53,8 @@ pub(super) fn table_3_1(case: &Case<'_>, statements: &[TheoryRow]) -> Option<The
     let agree = statements.iter().all(|row| row.holds != Some(false));
     let moves = mission.speed.at(mission.end).v_l != 0.0;
     let holds = covered && agree && moves;
-    let mut value = format!(
-        "{kind} with {}: {statement}",
-        if marine { "Proposition 3.3" } else { "Proposition 3.1 or 3.2" }
-    );
+    let mut value =
+        format!("{kind} with {}: {statement}", if marine { "Proposition 3.3" } else { "Proposition 3.1 or 3.2" });
     if !agree {
         value += "; the statement about agreement does not hold";
     }
@@ -68,7 +68,10 @@ pub(super) fn table_3_1(case: &Case<'_>, statements: &[TheoryRow]) -> Option<The
         holds: Some(holds),
         predicted: if holds { "all errors vanish, from every start".into() } else { "–".into() },
         measured: case.measured(|s| {
-            format!("{:.3e} m off the paths, {:.3e} apart at the end", s.fleet.path_error_final_m, s.fleet.coordination.last)
+            format!(
+                "{:.3e} m off the paths, {:.3e} apart at the end",
+                s.fleet.path_error_final_m, s.fleet.coordination.last
+            )
         }),
         ..TheoryRow::default()
     };

@@ -69,7 +69,11 @@ impl Switching {
             let up = |state: &[bool], link: usize| state.get(link).copied().unwrap_or(false);
             let both = so_far.states.iter().flat_map(|before| {
                 own.states.iter().map(move |state| {
-                    before.iter().enumerate().map(|(link, &before)| before && (!counts(link) || up(state, link))).collect()
+                    before
+                        .iter()
+                        .enumerate()
+                        .map(|(link, &before)| before && (!counts(link) || up(state, link)))
+                        .collect()
                 })
             });
             let found = Possible::of(both, most);
