@@ -14,7 +14,7 @@ use common::theory::theorem_4_4::Coordination;
 
 use super::directed::with_leader;
 use super::network::Network;
-use super::premises::Way;
+use super::surroundings::Way;
 use crate::results::{Chart, Curve, Figure};
 
 /// ξ \[rad/s\] and k \[rad²/s²\] of Figure 2.8.

@@ -8,7 +8,7 @@ use super::Case;
 use super::delayed::told_truly;
 use super::graph::graph_facts;
 use super::learned_speeds::stuck_at_the_end;
-use super::premises::Disturbances;
+use super::surroundings::Disturbances;
 use super::switching::moves_as_told;
 use super::talk::speed_factor;
 use crate::results::TheoryRow;

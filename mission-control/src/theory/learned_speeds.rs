@@ -7,7 +7,7 @@ use common::theory::gateway_2_35::Gateway;
 use common::theory::polynomial::slowest;
 use common::theory::{Verdict, decoupling_2_37, neighbours};
 
-use super::premises::{turning, undisturbed, undisturbed_but_for_failures};
+use super::surroundings::{turning, undisturbed, undisturbed_but_for_failures};
 use super::{Case, mode_words};
 use crate::results::TheoryRow;
 

@@ -6,7 +6,7 @@
 //!
 //! | what | source | file |
 //! |---|---|---|
-//! | what statements ask for beyond their network | – | `premises.rs` |
+//! | what statements ask for beyond their network | – | `surroundings.rs` |
 //! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
 //! | matrices of the graph, all graphs that can be | section 3.1, Lemma 4.1 | `graph.rs` |
 //! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
@@ -32,7 +32,7 @@ mod graph;
 mod introduction;
 mod learned_speeds;
 mod network;
-mod premises;
+mod surroundings;
 mod solutions;
 mod switching;
 mod talk;
@@ -53,7 +53,7 @@ pub use watched::so_far;
 
 use crate::results::{BELOW, FIT_PART, Summary, TheoryRow};
 use network::Network;
-use premises::{Disturbances, Way, undisturbed};
+use surroundings::{Disturbances, Way, undisturbed};
 
 /// A guaranteed decay of the coordination error: ‖e(t)‖ ≤ factor · exp(−rate t) ‖e(0)‖.
 #[derive(Clone, Copy, Debug, PartialEq)]

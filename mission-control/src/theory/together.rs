@@ -3,7 +3,7 @@
 use common::mission::file::{FollowingChoice, LawChoice};
 
 use super::Case;
-use super::premises::undisturbed;
+use super::surroundings::undisturbed;
 use crate::results::TheoryRow;
 
 /// Path following of chapter 3 alone: conditions i and ii say that the speed must not die out.
