@@ -55,6 +55,9 @@ enum What {
         /// JSON for a pipe
         #[arg(long)]
         json: bool,
+        /// Also print the graph: degrees, Laplacian, spanning tree, eigenvalues, all graphs that the network can take
+        #[arg(long)]
+        graph: bool,
         /// Also draw what theory gives without a run, as SVG files
         #[arg(long, value_name = "DIR")]
         figures: Option<PathBuf>,
@@ -328,7 +331,7 @@ pub fn main(cli: Cli) -> ExitCode {
 
 fn run(what: What) -> Ended {
     match what {
-        What::Check { mission, json, figures } => check(&mission, json, figures.as_deref()),
+        What::Check { mission, json, graph, figures } => check(&mission, json, graph, figures.as_deref()),
         What::Simulate { mission, out, sets, seed, json } => simulate(&mission, out.as_deref(), &sets, seed, json),
         What::Sweep { mission, sets, repeat, measure, out } => sweep(&mission, &sets, repeat, &measure, out),
         What::Study { study: path, out } => study(&path, out),
@@ -368,7 +371,7 @@ fn read_bounded(path: &Path) -> std::io::Result<String> {
     Ok(text)
 }
 
-fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
+fn check(path: &Path, json: bool, graph: bool, figures: Option<&Path>) -> Ended {
     let mission = folder::load(path).map_err(|reason| End(2, reason))?;
     let rows = theory::rows(&mission, None);
     if json {
@@ -382,7 +385,9 @@ fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
             })
             .collect();
         let digest = format!("{:016x}", mission.digest);
-        bus::tell!("{:#}", serde_json::json!({"mission": mission.name, "digest": digest, "theory": rows}));
+        let graph = theory::graph_facts(&mission);
+        let all = serde_json::json!({"mission": mission.name, "digest": digest, "theory": rows, "graph": graph});
+        bus::tell!("{all:#}");
     } else {
         bus::tell!(
             "{}: {} vehicles, {} directed links, {}",
@@ -392,6 +397,12 @@ fn check(path: &Path, json: bool, figures: Option<&Path>) -> Ended {
             mission.end
         );
         print_theory(&rows);
+        if graph {
+            bus::tell!("  Graph (sections 3.1 and 4.2)");
+            for line in theory::graph_facts(&mission).lines() {
+                bus::tell!("      {line}");
+            }
+        }
     }
     if let Some(folder) = figures {
         draw(&mission, folder).map_err(|error| End(4, format!("cannot draw in {}: {error}", folder.display())))?;
@@ -567,7 +578,11 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, sound: bool, summary: &S
         bus::tell!("{}", serde_json::to_string_pretty(summary).map_err(|error| End(4, error.to_string()))?);
     } else {
         bus::tell!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
-        print_theory(&theory::rows(mission, Some(summary)));
+        let rows = theory::rows(mission, Some(summary));
+        print_theory(&rows);
+        for row in rows.iter().filter(|row| row.is_below()) {
+            bus::remark!("warning: {}: {}, although its conditions hold", row.name, row.measured);
+        }
         let m = &summary.fleet.messages;
         let more: String = [
             (m.out_of_range, "out of range"),

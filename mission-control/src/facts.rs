@@ -1,12 +1,12 @@
 //! What a mission tells the report beforehand: names, paths, and what theory predicts.
 
 use common::mission::Mission;
-use common::mission::file::{LawChoice, MissionFile, ModelChoice, PathChoice, SwitchingChoice};
+use common::mission::file::{FollowingChoice, LawChoice, MissionFile, ModelChoice, PathChoice, SwitchingChoice};
 use common::record::Record;
 use common::time::Time;
 use common::wire::vehicle::SpeedCommand;
 
-use crate::results::{Facts, VehicleFacts};
+use crate::results::{Facts, VehicleFacts, Way};
 use crate::theory;
 
 /// Points of a planned path in a figure.
@@ -45,21 +45,33 @@ pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
         duration_s: mission.end.secs(),
         control_period_s: mission.control_period.secs(),
         validity_s: mission.validity.map(|validity| validity.secs()),
-        link_period_s: file.as_ref().and_then(|file| match &file.network.switching {
-            SwitchingChoice::Periodic(periodic) => Some(periodic.period_s),
-            SwitchingChoice::Intervals(intervals) => intervals.period_s,
-            _ => None,
-        }),
+        link_period_s: file.as_ref().and_then(period_of),
         guaranteed_rate: guarantee.map(|g| g.rate),
+        least_rate: theory::least_rate(mission),
         guaranteed_factor: guarantee.and_then(|g| g.factor),
         formation_speed_at_the_end: Some(v_l),
-        predicted_speed: mission.excited_speed_at(v_l).or_else(|| Some(theory::speed_factor(mission)? * v_l)),
+        predicted_speed: theory::predicted_speed(mission, v_l),
         predicted_along_bias_m: mission.predicted_along_bias(0),
         symbol: if is_chapter_4(mission) { "γ".to_string() } else { "ξ".to_string() },
         xi_unit: String::new(),
         spatial: mission.vehicles.iter().any(|v| matches!(v.model, ModelChoice::UnderactuatedAuv(_))),
         missing: Vec::new(),
         aborted: Vec::new(),
+        graph: Some(theory::graph_facts(mission)),
+    }
+}
+
+/// The period of the mission's switching network \[s\], if it has one.
+pub(crate) fn link_period(mission: &Mission) -> Option<f64> {
+    let file: MissionFile = toml::from_str(&mission.text).ok()?;
+    period_of(&file).filter(|_| file.network.also.is_empty())
+}
+
+fn period_of(file: &MissionFile) -> Option<f64> {
+    match &file.network.switching {
+        SwitchingChoice::Periodic(periodic) => Some(periodic.period_s),
+        SwitchingChoice::Intervals(intervals) => intervals.period_s,
+        _ => None,
     }
 }
 
@@ -92,7 +104,10 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         PathChoice::Spline(_) => "spline",
         PathChoice::Geojson(_) => "waypoints",
     });
+    // A target of Theorem 4.7 moves just as coordination tells it; all others move with their vehicles.
+    let goes_along = !matches!(plan.following, FollowingChoice::Theorem47(_));
     VehicleFacts {
+        way: Way(goes_along.then(|| plan.path.clone())),
         id: plan.id.clone(),
         pattern: plan.pattern,
         path: path.to_string(),

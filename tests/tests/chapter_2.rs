@@ -108,7 +108,9 @@ fn figure_2_15_a_stuck_robot_stays_a_twelfth_of_a_radian_off_unless_there_is_ano
         }
     }
     assert_eq!(a.theory("(2.43)").predicted, "-0.083333");
-    assert_eq!(a.theory("(2.35)").holds, Some(true));
+    // (2.35) speaks of a fleet without failures; (2.42) of this one, and all learn the speed of the stuck robot: 0.25/3.
+    assert_eq!((a.theory("(2.35)").holds, a.theory("(2.35)").guaranteed_rate), (None, None));
+    assert_close("fleet speed", a.summary.fleet.predicted_speed.expect("theory has a word on it"), 0.25 / 3.0, 1e-12);
     assert_eq!(b.theory("failed follower").holds, Some(true));
 }
 
@@ -117,11 +119,19 @@ fn section_2_4_followers_go_with_a_stuck_leader_and_do_not_mind_a_stuck_follower
     let leader = Flown::file("leader-follower-failing-leader");
     assert!(leader.summary.fleet.coordination.last < 1e-3, "{}", leader.summary.fleet.coordination.last);
     assert_close("r3", leader.last(2).speed_mps, 0.3, 1e-3);
+    assert_close("fleet speed", leader.summary.fleet.predicted_speed.expect("theory has a word on it"), 0.075, 1e-12);
+    // λ = −1 three times is no rate itself; with path following it is (2.37), and the flight keeps that.
+    assert_eq!(leader.theory("(2.29)").guaranteed_rate, None);
+    assert!(leader.theory("(2.29)").predicted.contains("every rate below 1.0"), "{:?}", leader.theory("(2.29)"));
+    let coupled = leader.theory("(2.37)");
+    assert!(coupled.guaranteed_rate.is_some_and(|rate| rate > 0.7) && !coupled.is_below(), "{coupled:?}");
     let follower = Flown::file("leader-follower-failing-follower");
     assert!((follower.last(0).xi - follower.last(2).xi).abs() < 1e-4);
     // 80 s of 0.05 m/s too little on 3 m.
     assert_close("r2", follower.last(0).xi - follower.last(1).xi, 80.0 * 0.05 / 3.0, 1e-2);
     assert_eq!(follower.theory("(2.37)").holds, Some(true));
+    assert!(follower.theory("(2.37)").value.contains("said of the others than r2"));
+    assert_eq!(follower.summary.fleet.predicted_speed, None);
 }
 
 #[test]

@@ -133,6 +133,16 @@ impl Graph {
         self.degrees() - self.adjacency()
     }
 
+    /// MWM' of (3.62) for two-way links: L with a weight on each link, `weight(i, j)` = `weight(j, i)`.
+    pub fn weighted_laplacian(&self, weight: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        let mut laplacian = DMatrix::zeros(self.len(), self.len());
+        for (i, j) in self.arcs() {
+            laplacian[(i, j)] = -weight(i, j);
+            laplacian[(i, i)] += weight(i, j);
+        }
+        laplacian
+    }
+
     /// Normalised Laplacian D⁻¹L, with d_ii := 1 where N_i is empty (erratum 3.16): each row averages over N_i.
     pub fn normalised_laplacian(&self) -> DMatrix<f64> {
         let mut laplacian = self.laplacian();

@@ -17,3 +17,8 @@ pub mod spectrum;
 pub mod switching;
 
 pub use digraph::Graph;
+
+/// A matrix row by row, for what knows nothing of matrices.
+pub fn rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}

@@ -25,6 +25,7 @@ pub use speed::SpeedProfile;
 
 use crate::coordination::FleetLaw;
 use crate::craft::{Craft, Limits};
+use crate::following::theorem_4_7::Gains;
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::network::Medium;
@@ -234,6 +235,21 @@ impl Mission {
             bend,
         };
         underactuated.type_1()
+    }
+
+    /// |δ_1| of a vehicle under Theorem 4.7, and what it must exceed so that the matrix keeps its rank at every nominal speed of
+    /// the mission (erratum 4.11) \[m/s\].
+    pub fn rank_margin(&self, vehicle: usize) -> Option<(f64, f64)> {
+        let plan = &self.vehicles[vehicle];
+        match (&plan.model, &plan.following) {
+            (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) => {
+                let (gains, auv) = (build::auv_gains(gains), build::auv(model).ok()?);
+                let fastest = self.speed.fastest() * self.nominal_factor();
+                let stretch = build::largest_stretch(plan.path.as_ref());
+                Some((gains.delta1.abs(), Gains::smallest_delta1(&auv, fastest, stretch)))
+            }
+            _ => None,
+        }
     }
 
     /// The rate at which α_2 lets the fleet travel in the end under (4.59), where it is fed back and does not vanish

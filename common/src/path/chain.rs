@@ -74,6 +74,7 @@ pub struct Chain {
     pieces: Vec<Piece>,
     search_range: (f64, f64),
     corners: Vec<f64>,
+    joints: Vec<f64>,
 }
 
 impl Chain {
@@ -115,7 +116,8 @@ impl Chain {
         let first_end = pieces.get(1).map_or(xi, |second| second.xi);
         let before = if first.curvature == 0.0 { first_end } else { 0.0 };
         let after = if last.curvature == 0.0 { xi - last.xi } else { 0.0 };
-        Ok(Chain { search_range: (-before, xi + after), pieces, corners })
+        let joints = pieces.iter().skip(1).map(|piece| piece.xi).collect();
+        Ok(Chain { search_range: (-before, xi + after), pieces, corners, joints })
     }
 }
 
@@ -131,6 +133,10 @@ impl Path for Chain {
 
     fn tangent_breaks(&self) -> &[f64] {
         &self.corners
+    }
+
+    fn joints(&self) -> &[f64] {
+        &self.joints
     }
 }
 

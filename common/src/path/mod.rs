@@ -58,6 +58,11 @@ pub trait Path: Send + Sync + std::fmt::Debug {
     fn tangent_breaks(&self) -> &[f64] {
         &[]
     }
+
+    /// The parameters at which R = ds/dξ or the curvature may jump; between them both are continuous.
+    fn joints(&self) -> &[f64] {
+        &[]
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@
 //!
 //! as in (3.75). θ = 0 means agreement. With constant C its eigenvalues are the exact rates, whatever the graph.
 
-use nalgebra::{Complex, DMatrix, DVector};
+pub use nalgebra::Complex;
+use nalgebra::{DMatrix, DVector};
 
 use crate::graph::Graph;
 use crate::graph::incidence::Differences;
@@ -45,6 +46,22 @@ pub enum Law {
     },
 }
 
+/// How much later than it is a law sees what it uses \[s\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Late {
+    /// The vehicle's own state.
+    pub own: f64,
+    /// That of its neighbours.
+    pub neighbours: f64,
+}
+
+impl Late {
+    /// A law that is held for a control period is half of it late; what neighbours say takes another.
+    pub fn held(period: f64) -> Late {
+        Late { own: 0.5 * period, neighbours: 1.5 * period }
+    }
+}
+
 impl Law {
     /// (E, G) of u = −Eη − Gξ, for C = diag(1/R_i) and the Laplacian L.
     pub fn matrices(self, c: &DVector<f64>, l: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
@@ -62,17 +79,29 @@ impl Law {
     /// Eigenvalues of the closed loop in (η, θ) on this graph, with R_i \[m per unit of ξ\] constant. `None` if the
     /// graph cannot agree, or something is not positive and finite.
     pub fn eigenvalues(self, graph: &Graph, r: &[f64]) -> Option<Vec<Complex<f64>>> {
+        self.late_eigenvalues(graph, &graph.laplacian(), r, Late::default())
+    }
+
+    /// The same with another matrix for L that is zero where L is, such as MWM' of (3.62), and for a law that acts late, to first order
+    /// in that: it uses η(t − τ) ≈ η − τη' and ξ(t − τ) ≈ ξ − τCη, each with the τ of who says it.
+    pub fn late_eigenvalues(self, graph: &Graph, l: &DMatrix<f64>, r: &[f64], late: Late) -> Option<Vec<Complex<f64>>> {
         let n = graph.len();
-        if r.len() != n || !r.iter().all(|&r| r > 0.0 && r.is_finite()) {
+        if r.len() != n || l.shape() != (n, n) || !r.iter().all(|&r| r > 0.0 && r.is_finite()) {
             return None;
         }
         let c = DVector::from_iterator(n, r.iter().map(|r| 1.0 / r));
         let split = Differences::of(graph)?;
-        let (e, g) = self.matrices(&c, &graph.laplacian());
+        let (e, g) = self.matrices(&c, l);
+        let times = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * if i == j { late.own } else { late.neighbours })
+        };
+        let (pull, way) = (&g * &split.f_1, &split.f_2 * DMatrix::from_diagonal(&c));
+        // (I − τE)η' = −Eη − Gξ + τGCη, τ by entries.
+        let lead = (DMatrix::identity(n, n) - times(&e)).try_inverse()?;
         let mut closed = DMatrix::zeros(2 * n - 1, 2 * n - 1);
-        closed.view_mut((0, 0), (n, n)).copy_from(&-e);
-        closed.view_mut((0, n), (n, n - 1)).copy_from(&-(g * &split.f_1));
-        closed.view_mut((n, 0), (n - 1, n)).copy_from(&(&split.f_2 * DMatrix::from_diagonal(&c)));
+        closed.view_mut((0, 0), (n, n)).copy_from(&(&lead * (times(&g) * DMatrix::from_diagonal(&c) - e)));
+        closed.view_mut((0, n), (n, n - 1)).copy_from(&-(lead * pull));
+        closed.view_mut((n, 0), (n - 1, n)).copy_from(&way);
         eigenvalues(&closed)
     }
 
@@ -95,7 +124,7 @@ impl DiagonalInverse for DMatrix<f64> {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::Law;
+    use super::{Complex, Late, Law};
     use crate::graph::Graph;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
@@ -134,6 +163,19 @@ pub(crate) mod tests {
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&Graph::empty(2), &[1.0; 2]), None);
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0]), None);
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_late_law_is_slower_as_the_exact_delay_says() {
+        // One vehicle pair, solution II with R = 1: the difference obeys s² + (as + 2b)e^(−sτ) = 0.
+        let (law, pair, tau) = (Law::SolutionTwo { a: 1.0, b: 0.4 }, Graph::complete(2), 0.01);
+        let both = Late { own: tau, neighbours: tau };
+        let late = law.late_eigenvalues(&pair, &pair.laplacian(), &[1.0; 2], both).expect("connected");
+        let residual = |s: &Complex<f64>| (s * s + (s * 1.0 + 0.8) * (-s * tau).exp()).norm();
+        let pair_of_modes: Vec<_> = late.iter().filter(|mode| mode.im != 0.0).collect();
+        assert!(pair_of_modes.len() == 2 && pair_of_modes.iter().all(|mode| residual(mode) < 1e-4), "{late:?}");
+        let prompt = law.rate(&pair, &[1.0; 2]).expect("connected");
+        assert!((prompt - 0.5).abs() < 1e-12 && pair_of_modes[0].re > -prompt + 1e-3);
     }
 
     proptest! {

@@ -5,6 +5,7 @@
 //! | two vehicles that switch | Lemma 1.1, (1.6), (1.7); erratum 1.1 | \|x\| decays at (1 − α)a | [`lemma_1_1`] |
 //! | decoupled path following with a leader | (2.15), (2.16), (2.37), (2.38); errata 2.1, 2.3 | stable above a critical λ_p | [`decoupling_2_37`] |
 //! | gateway, with a failed vehicle | (2.29), (2.35), (2.42), (2.43); errata 2.2, 2.11 | stable; a known steady error | [`gateway_2_35`] |
+//! | neighbours in a row | this project, result x of docs/errata.md | the slowest mode | [`neighbours`] |
 //! | two-way fixed networks | Propositions 3.4, 3.5; (3.41), (3.48), (3.75) | agreement; exact rates, and one for varying R_i proven here | [`proposition_3_4`], [`linear_coordination`] |
 //! | one-way fixed networks | Propositions 3.6, 3.7, (3.73), (3.81), (3.85), (3.93); errata 3.13, 3.15, 3.16 | agreement at the slowest root | [`proposition_3_6`] |
 //! | bounded speeds with saturation | Proposition 3.8, Lemma 6.1, (3.97); erratum 3.14 | Q > 0 | [`proposition_3_8`] |
@@ -34,6 +35,7 @@ pub mod lemma_1_1;
 pub mod lemma_4_6;
 pub mod linear_coordination;
 pub mod monitor;
+pub mod neighbours;
 pub mod polynomial;
 pub mod proposition_3_4;
 pub mod proposition_3_6;

@@ -44,6 +44,17 @@ pub fn shifted_power(root: f64, power: usize) -> Vec<f64> {
     (0..power).fold(vec![1.0], |product, _| multiply(&product, &[1.0, root]))
 }
 
+/// The rate of the slowest root, minus its real part, and how many roots are there with it: errors then decay as t^(k−1) e^(−rate t),
+/// for k > 1 at every rate below it but not at it. Roots that agree to four digits count as one. `None` as for [`roots`].
+pub fn slowest(polynomial: &[f64]) -> Option<(f64, usize)> {
+    let roots = roots(polynomial)?;
+    let last = *roots.iter().max_by(|a, b| a.re.total_cmp(&b.re))?;
+    let same = roots.iter().filter(|root| (*root - last).norm() <= 1e-4 * last.norm());
+    let (count, sum) = same.fold((0, 0.0), |(count, sum), root| (count + 1, sum - root.re));
+    // Their mean is right to more digits than each of them.
+    Some((sum / count as f64, count))
+}
+
 /// All roots, as eigenvalues of the companion matrix, by real part and then by imaginary part. `None` if the leading
 /// coefficient is zero, or one is not finite.
 ///
@@ -119,6 +130,18 @@ mod tests {
         assert!(!is_hurwitz(&[1.0, 1.0, 1.0, 1.0]) && !is_hurwitz(&[1.0, 1.0, 1.0, 2.0]));
         assert!(!is_hurwitz(&[1.0, -1.0]) && !is_hurwitz(&[]) && !is_hurwitz(&[0.0, 1.0]) && is_hurwitz(&[4.0]));
         assert!(!is_hurwitz(&[1.0, f64::INFINITY]) && !is_hurwitz(&[1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_root_several_times_is_counted() {
+        let close = |found: Option<(f64, usize)>, rate: f64, times| {
+            found.is_some_and(|(found, count)| (found - rate).abs() < 1e-6 && count == times)
+        };
+        assert!(close(slowest(&shifted_power(1.0, 3)), 1.0, 3));
+        assert!(close(slowest(&[1.0, 0.4, 0.04]), 0.2, 2));
+        assert!(close(slowest(&[1.0, 3.0, 2.0]), 1.0, 1));
+        assert!(close(slowest(&[1.0, 1.0, 1.0]), 0.5, 1), "a pair of complex roots is two different ones");
+        assert_eq!(slowest(&[0.0, 1.0]), None);
     }
 
     proptest! {

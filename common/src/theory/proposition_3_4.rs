@@ -21,7 +21,11 @@
 //! ```
 //!
 //! (and c + d for the part of z that no θ drives). The least eigenvalue r of all of them gives −V' ≥ 2rV: norms of (θ, z)
-//! decay at r, for every way in which R_i varies. ∎
+//! decay at r, for every way in which R_i varies while it is differentiable. ∎
+//!
+//! η = v − R v_L follows η' = u only where R is differentiable. Where R jumps, v does not, so η jumps by (R₋ − R₊)v_L
+//! (erratum 3.18) and V may jump up: on a chain of lines and arcs the rate holds from one joint to the next, and nothing is
+//! promised over all of the way. The propositions then promise agreement after the last joint.
 //!
 //! For solution III this holds from when 2V ≤ x_m² on, as V never grows and |z_i| ≤ √(2V).
 
@@ -35,18 +39,10 @@ use crate::graph::spectrum::symmetric_eigenvalues;
 pub enum PathRates {
     /// R_i, constant.
     Constant(Vec<f64>),
-    /// The largest of all R_i anywhere; c_1 = 1/R.
+    /// The largest of all R_i anywhere, each of them differentiable along the way; c_1 = 1/R.
     AtMost(f64),
-}
-
-impl PathRates {
-    /// c_1 of (3.42).
-    fn c_1(&self) -> f64 {
-        match self {
-            PathRates::Constant(r) => 1.0 / r.iter().copied().fold(0.0, f64::max),
-            PathRates::AtMost(r) => 1.0 / r,
-        }
-    }
+    /// Some R_i jumps on the way: η jumps there, and no rate holds over all of it.
+    Jumping,
 }
 
 /// r above: a rate \[1/s\] that holds however R_i varies, for solutions I and III (unsaturated); `None` for the other
@@ -83,14 +79,21 @@ pub fn verdict(law: Law, graph: &Graph, paths: &PathRates, fixed: bool) -> Verdi
     let holds = fixed && two_way && connected;
     let rate = match paths {
         PathRates::Constant(r) => law.rate(graph, r),
-        PathRates::AtMost(_) => rate_for_varying_paths(law, graph, paths.c_1()),
+        PathRates::AtMost(r) => rate_for_varying_paths(law, graph, 1.0 / r),
+        PathRates::Jumping => None,
+    };
+    let ways = match paths {
+        PathRates::Constant(_) => "",
+        PathRates::AtMost(_) => ", R_i varies",
+        PathRates::Jumping => ", R_i jumps at joints of the paths, and η with it (erratum 3.18): no rate over them",
     };
     let words = |yes: bool, word: &'static str, no: &'static str| if yes { word } else { no };
     Verdict {
         name,
-        condition: "two-way connected network that does not change, delays or loses nothing".to_owned(),
+        condition: "two-way connected network that does not change, delays or loses nothing; on the paths (d = 0)"
+            .to_owned(),
         value: format!(
-            "{}, {}, {}",
+            "{}, {}, {}{ways}",
             words(two_way, "two-way", "one-way links"),
             words(connected, "connected", "not connected"),
             words(fixed, "fixed", "changes, delays or loses")
@@ -128,6 +131,25 @@ mod tests {
         let apart = verdict(law, &Graph::empty(2), &constant, true);
         assert!(!apart.holds && apart.value.contains("not connected"));
         assert!(verdict(law, &Graph::complete(2), &PathRates::AtMost(4.0), true).norm_rate.is_some());
+        let jumping = verdict(law, &Graph::complete(2), &PathRates::Jumping, true);
+        assert!(jumping.holds && jumping.norm_rate.is_none() && jumping.value.contains("erratum 3.18"));
+        assert!(good.condition.contains("d = 0"));
+    }
+
+    #[test]
+    fn where_r_jumps_eta_jumps_and_the_rate_does_not_hold() {
+        // Two vehicles in agreement, v_L = 1, until the R of one of them falls from 2 to 1: v stays, η = v − R v_L does not.
+        let (law, pair) = (Law::SolutionOne { a: 1.0 }, Graph::complete(2));
+        let (l, rate) = (pair.laplacian(), rate_for_varying_paths(law, &pair, 0.5).expect("connected"));
+        let v = |state: &DVector<f64>| {
+            let (eta, xi) = (state.rows(0, 2).into_owned(), state.rows(2, 2).into_owned());
+            (xi.dot(&(&l * &xi)).max(0.0) + (eta + &l * &xi).norm_squared()).sqrt()
+        };
+        let start = DVector::from_vec(vec![0.1, 0.0, 0.0, 0.0]);
+        let mut state = flow(law, &pair, &[2.0, 2.0], 1.0) * &start;
+        assert!(v(&state) <= v(&start) * (-rate).exp());
+        state[0] += 2.0 - 1.0;
+        assert!(v(&state) > v(&start), "the promise of one second does not survive the joint");
     }
 
     proptest! {

@@ -52,6 +52,36 @@ impl DirectedLaw {
         spectrum.iter().map(least).fold(0.0, f64::max)
     }
 
+    /// Which equation the condition is.
+    pub fn equation(self) -> &'static str {
+        match self {
+            DirectedLaw::OverC => "(3.73)",
+            DirectedLaw::TimesC(_) => "(3.85)",
+            DirectedLaw::Leader => "(3.93)",
+        }
+    }
+
+    /// The upper half of the border that a²/b draws in the plane of μ, up to |μ| or Re μ of about `reach`: the condition holds iff all
+    /// eigenvalues are to the right of it and of its mirror image.
+    pub fn border(self, ratio: f64, reach: f64, points: u32) -> Vec<(f64, f64)> {
+        let part = |i: u32| f64::from(i) / f64::from(points);
+        match self {
+            DirectedLaw::OverC | DirectedLaw::TimesC(_) => {
+                let c = if let DirectedLaw::TimesC(c) = self { c } else { 1.0 };
+                let at = |re: f64| (re, (ratio * re).sqrt() / c);
+                // Close together where the curve is steep.
+                (0..=points).map(|i| at(reach * part(i) * part(i))).collect()
+            }
+            // sin²φ = (a²/b) ρ cos φ for μ = ρe^{jφ}.
+            DirectedLaw::Leader => (0..=points)
+                .map(|i| std::f64::consts::FRAC_PI_2 * part(i))
+                .map(|phi| (phi, phi.sin().powi(2) / (ratio * phi.cos())))
+                .take_while(|(_, rho)| *rho <= reach)
+                .map(|(phi, rho)| (rho * phi.cos(), rho * phi.sin()))
+                .collect(),
+        }
+    }
+
     /// The two roots that belong to μ; for (3.72) that is (3.81).
     pub fn roots(self, a: f64, b: f64, mu: Complex<f64>) -> [Complex<f64>; 2] {
         let (p, q) = match self {
@@ -76,10 +106,11 @@ impl DirectedLaw {
 
     /// What the proposition says of this fleet; `fixed`: the network never changes, and delays and loses nothing.
     pub fn verdict(self, graph: &Graph, normalised: bool, a: f64, b: f64, fixed: bool) -> Verdict {
-        let (name, equation) = match self {
-            DirectedLaw::OverC => ("Proposition 3.6", "(3.73)"),
-            DirectedLaw::TimesC(_) => ("Remark 3.13", "(3.85)"),
-            DirectedLaw::Leader => ("Proposition 3.7", "(3.93)"),
+        let equation = self.equation();
+        let name = match self {
+            DirectedLaw::OverC => "Proposition 3.6",
+            DirectedLaw::TimesC(_) => "Remark 3.13",
+            DirectedLaw::Leader => "Proposition 3.7",
         };
         let Some(spectrum) = nonzero_spectrum(graph, normalised) else {
             return Verdict {
@@ -231,6 +262,18 @@ mod tests {
             prop_assert!(rate_with_leader(&graph, above, b, &r) > 0.0);
             prop_assert!(rate_with_leader(&graph, below, b, &r) < 0.0);
             prop_assert!((law.rate(above, b, &spectrum) - rate_with_leader(&graph, above, b, &r)).abs() < 1e-3);
+        }
+
+        #[test]
+        fn on_the_border_the_condition_is_just_met(ratio in 0.1..5.0f64, c in 0.3..3.0f64) {
+            for law in [DirectedLaw::OverC, DirectedLaw::TimesC(c), DirectedLaw::Leader] {
+                let border = law.border(ratio, 3.0, 50);
+                prop_assert!(border.len() > 3);
+                for &(re, im) in border.iter().filter(|(re, im)| *re > 1e-9 && *im > 1e-9) {
+                    let threshold = law.threshold(&[Complex::new(re, im)]);
+                    prop_assert!((threshold - ratio).abs() < 1e-6 * ratio, "{:?} {} {}: {}", law, re, im, threshold);
+                }
+            }
         }
 
         #[test]

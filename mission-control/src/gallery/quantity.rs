@@ -54,7 +54,7 @@ fn each(tracks: &[Track<'_>], points: impl Fn(&Track<'_>) -> Vec<(f64, f64)>) ->
 
 /// ξ_1 − ξ_j for every other vehicle.
 fn differences(flight: &Flight, tracks: &[Track<'_>], symbol: &str, with_pattern: bool) -> Vec<Series> {
-    let Coordination { t_s, states } = Coordination::of(tracks, &flight.facts);
+    let Coordination { t_s, states, .. } = Coordination::of(tracks, &flight.facts);
     // Vehicles without rows have no states; the mission's own order is that of the tracks that have some.
     let present: Vec<usize> = (0..tracks.len()).filter(|&i| !tracks[i].rows.is_empty()).collect();
     let Some(&first) = present.first() else { return Vec::new() };

@@ -1,6 +1,11 @@
 //! What the caller knows of a mission and the results need: names, patterns, predictions.
 
+use std::sync::Arc;
+
 use common::mission::Pattern;
+use common::path::Path;
+
+use super::GraphFacts;
 
 /// What is known of a run without looking at its recording.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,6 +30,8 @@ pub struct Facts {
     pub link_period_s: Option<f64>,
     /// The rate at which theory guarantees that the norm of the coordination error decays \[1/s\].
     pub guaranteed_rate: Option<f64>,
+    /// What is left of it by the law's being held for a control period, where that is less \[1/s\].
+    pub least_rate: Option<f64>,
     /// The factor c of the guarantee ‖e(t)‖ ≤ c·exp(−rate·t)·‖e(0)‖; the envelope is drawn where it is known.
     pub guaranteed_factor: Option<f64>,
     /// The formation speed v_L in force at the end \[units of ξ per s\].
@@ -43,6 +50,23 @@ pub struct Facts {
     pub missing: Vec<String>,
     /// Vehicles that gave up, and why.
     pub aborted: Vec<String>,
+    /// Who can hear whom, and what follows from it.
+    pub graph: Option<GraphFacts>,
+}
+
+/// The path whose R = ds/dξ turns a vehicle's speed into the rate of its coordination state, for a vehicle whose target goes where the
+/// vehicle goes: d = ξ̇ − v/R (3.36) is then what path following does to coordination.
+#[derive(Clone, Debug, Default)]
+pub struct Way(pub Option<Arc<dyn Path>>);
+
+/// The same path, not one like it.
+impl PartialEq for Way {
+    fn eq(&self, other: &Way) -> bool {
+        match (&self.0, &other.0) {
+            (Some(one), Some(two)) => Arc::ptr_eq(one, two),
+            (one, two) => one.is_none() && two.is_none(),
+        }
+    }
 }
 
 /// What is known of one vehicle.
@@ -56,6 +80,8 @@ pub struct VehicleFacts {
     pub path: String,
     /// The path as planned \[m\], for the figures; may be empty.
     pub planned: Vec<[f64; 3]>,
+    /// Its path, where its speed is what coordination commands.
+    pub way: Way,
     /// Size of one of its messages \[bytes\], if not the fleet's.
     pub message_bytes: Option<u64>,
 }

@@ -200,7 +200,7 @@ impl View<'_> {
         for (index, other) in present.enumerate() {
             // Each pair by itself: that a third one is away is nothing to it.
             let Some(first) = first else { break };
-            let Coordination { t_s, states } = Coordination::of(&[first.clone(), other.clone()], self.facts);
+            let Coordination { t_s, states, .. } = Coordination::of(&[first.clone(), other.clone()], self.facts);
             let parts = unbroken(&t_s, self.facts)
                 .into_iter()
                 .map(|part| part.map(|at| (t_s[at], states[0][at] - states[1][at])).collect());

@@ -8,7 +8,7 @@ use std::path::Path;
 use bus::recording::Recording;
 use serde::Serialize;
 
-use super::{Facts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
+use super::{Facts, GraphFacts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
 
 /// What the caller has to tell in the report besides numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,7 +47,7 @@ pub fn write_run_folder(
         guaranteed_factor: envelope.and_then(|envelope| envelope.1),
         ..facts.clone()
     };
-    summary.fleet.coordination.hold_against(facts.guaranteed_rate);
+    summary.fleet.coordination.hold_against(facts.guaranteed_rate, facts.least_rate);
     let figures = figures(recording, facts);
     let page = report(&Report {
         facts,
@@ -65,10 +65,18 @@ pub fn write_run_folder(
         write(&drawings.join(figure.name).with_extension("svg"), figure.svg.as_bytes())?;
     }
     write(&directory.join("summary.json"), &json(&summary)?)?;
+    let theory = TheoryFile { theory: &theory, graph: facts.graph.as_ref() };
     write(&directory.join("theory.json"), &json(&theory)?)?;
     write(&directory.join("clock.json"), &json(&clock)?)?;
     write(&directory.join("report.html"), page.as_bytes())?;
     Ok(summary)
+}
+
+/// `theory.json`: as `check --json` has it.
+#[derive(Serialize)]
+struct TheoryFile<'a> {
+    theory: &'a [TheoryRow],
+    graph: Option<&'a GraphFacts>,
 }
 
 fn json(value: &impl Serialize) -> io::Result<Vec<u8>> {

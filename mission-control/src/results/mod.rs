@@ -17,6 +17,7 @@ mod export;
 mod facts;
 mod figures;
 mod folder;
+mod graph;
 mod legend;
 pub(crate) mod network;
 pub(crate) mod report;
@@ -30,13 +31,14 @@ mod trace;
 pub use chart::{Chart, Curve};
 pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
-pub use facts::{Facts, VehicleFacts};
+pub use facts::{Facts, VehicleFacts, Way};
 pub use figures::{Figure, figures};
 pub use folder::{Account, Theory, write_run_folder};
+pub use graph::{GraphFacts, SpanningFacts, SplitFacts, TakenFacts};
 pub use network::{Connectivity, LinkSummary, Network, Spread};
-pub use report::{Report, TheoryRow, report};
+pub use report::{BELOW, Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
-pub use statistics::{ExponentialFit, fit_exponential, settling_time};
+pub use statistics::{ExponentialFit, FIT_PART, fit_coordination, fit_exponential, settling_time};
 pub use summary::{
     Absence, ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals,
     NoteSummary, Summary, VehicleSummary, summarise, summarise_clock,

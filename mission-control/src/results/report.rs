@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::drawing::{GRID, INK, PAPER};
+use super::graph::printed;
 use super::summary::PATH_THRESHOLD_M;
-use super::{ClockSummary, Facts, Figure, LinkSummary, Summary, VehicleSummary};
+use super::{ClockSummary, Facts, Figure, GraphFacts, LinkSummary, Summary, VehicleSummary};
 
 /// A line of the table "theory beside measurement".
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -25,6 +26,16 @@ pub struct TheoryRow {
     pub guaranteed_rate: Option<f64>,
     /// What was measured.
     pub measured: String,
+}
+
+/// Ends the measured cell of a row whose rate was not reached although its conditions hold.
+pub const BELOW: &str = "below the guaranteed rate";
+
+impl TheoryRow {
+    /// Whether less was measured than is guaranteed, although all conditions hold.
+    pub fn is_below(&self) -> bool {
+        self.measured.ends_with(BELOW)
+    }
 }
 
 /// Everything that the report shows.
@@ -61,6 +72,7 @@ pub fn report(report: &Report<'_>) -> String {
     );
     header(&mut page, report);
     theory(&mut page, report.theory);
+    graph(&mut page, report.facts.graph.as_ref());
     figures(&mut page, report.figures);
     vehicles(&mut page, report);
     network(&mut page, report);
@@ -156,6 +168,10 @@ fn verdict(report: &Report<'_>) -> (bool, String) {
         let (noun, verb) = if failed == 1 { ("condition", "does") } else { ("conditions", "do") };
         sentences.push(format!("{failed} {noun} of the theory {verb} not hold for this mission."));
     }
+    if report.theory.iter().any(TheoryRow::is_below) {
+        good = false;
+        sentences.push(format!("The coordination error decayed {BELOW}."));
+    }
     (good, sentences.join(" "))
 }
 
@@ -174,9 +190,29 @@ fn theory(page: &mut String, rows: &[TheoryRow]) {
         let text =
             [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(&told(text)));
         let [name, condition, value, predicted, measured] = text;
+        let measured = if row.is_below() { format!("<span class=\"no\">{measured}</span>") } else { measured };
         vec![name, condition, value, holds.into(), predicted, measured]
     });
     table(page, "prose", &header, rows);
+    page.push_str("</section>\n");
+}
+
+/// The graph of all links, and its matrices if the fleet is small.
+fn graph(page: &mut String, graph: Option<&GraphFacts>) {
+    let Some(graph) = graph.filter(|graph| graph.vehicles.len() > 1) else { return };
+    page.push_str("<section>\n<h2>Graph</h2>\n");
+    let rows = graph.facts().into_iter().map(|(name, text)| vec![escape(name), escape(&text)]);
+    table(page, "prose", &["of the graph of all links", "here"], rows);
+    let matrices = graph.matrices();
+    if !matrices.is_empty() {
+        let order = escape(&graph.vehicles.join(", "));
+        let _ = writeln!(page, "<details><summary>Matrices, rows and columns in the order {order}</summary>");
+        for (name, matrix) in matrices {
+            let _ =
+                writeln!(page, "<p class=\"remark\">{}</p>\n<pre>{}</pre>", escape(name), printed(matrix).join("\n"));
+        }
+        page.push_str("</details>\n");
+    }
     page.push_str("</section>\n");
 }
 

@@ -6,8 +6,8 @@ use common::mission::Pattern;
 use common::record::{Record, SpeedRow, StateRow};
 use common::time::Time;
 
-use super::Facts;
 use super::statistics::mean;
+use super::{Facts, Way};
 
 /// The rows of one vehicle in order of time.
 #[derive(Clone, Debug)]
@@ -64,6 +64,9 @@ pub struct Coordination {
     pub t_s: Vec<f64>,
     /// For each vehicle that has rows, in the mission's order, its state at these instants.
     pub states: Vec<Vec<f64>>,
+    /// ‖(I − 11ᵀ/n) d‖ with d_i = ξ̇_i − v_i/R_i (3.36), how fast path following drives the error; `None` if no vehicle's speed is
+    /// what coordination commands.
+    pub disturbance: Option<Vec<f64>>,
 }
 
 impl Coordination {
@@ -73,7 +76,10 @@ impl Coordination {
         let gap_ns = (10.0 * facts.control_period_s * 1e9) as i64;
         let present: Vec<&Track<'_>> = tracks.iter().filter(|track| !track.rows.is_empty()).collect();
         let mut cursors = vec![0; present.len()];
-        let mut coordination = Coordination { t_s: Vec::new(), states: vec![Vec::new(); present.len()] };
+        let mut coordination =
+            Coordination { t_s: Vec::new(), states: vec![Vec::new(); present.len()], disturbance: None };
+        let ways: Vec<&Way> = present.iter().map(|track| way(facts, track.id)).collect();
+        let mut d = Vec::new();
         let Some(first) = present.first() else { return coordination };
         let mut states = Vec::with_capacity(present.len());
         for row in &first.rows {
@@ -85,8 +91,14 @@ impl Coordination {
             if states.len() == present.len() {
                 coordination.t_s.push(row.t_ns as f64 / 1e9);
                 coordination.states.iter_mut().zip(&states).for_each(|(series, state)| series.push(*state));
+                let driven = present.iter().zip(&cursors).zip(&ways);
+                let driven: Vec<f64> = driven
+                    .map(|((track, cursor), way)| driven_by_following(track, *cursor, way, facts.control_period_s))
+                    .collect();
+                d.push(from_mean(&driven));
             }
         }
+        coordination.disturbance = ways.iter().any(|way| way.0.is_some()).then_some(d);
         coordination
     }
 
@@ -101,10 +113,7 @@ impl Coordination {
 
     /// ‖(I − 11ᵀ/n) x‖, the norm of what the states differ from their mean by, over time.
     pub fn norm(&self) -> Vec<f64> {
-        self.over_time(|states| {
-            let mean = mean(states.iter().copied());
-            states.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>().sqrt()
-        })
+        self.over_time(from_mean)
     }
 
     fn over_time(&self, value: impl Fn(&[f64]) -> f64) -> Vec<f64> {
@@ -128,6 +137,28 @@ pub(super) fn unbroken(t_s: &[f64], facts: &Facts) -> Vec<Range<usize>> {
     let breaks = (1..t_s.len()).filter(|at| t_s[*at] - t_s[*at - 1] > longest);
     let bounds: Vec<usize> = std::iter::once(0).chain(breaks).chain([t_s.len()]).collect();
     bounds.windows(2).map(|pair| pair[0]..pair[1]).filter(|part| !part.is_empty()).collect()
+}
+
+/// The norm of what values differ from their mean by.
+fn from_mean(values: &[f64]) -> f64 {
+    let mean = mean(values.iter().copied());
+    values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>().sqrt()
+}
+
+fn way<'a>(facts: &'a Facts, id: &str) -> &'a Way {
+    const NONE: &Way = &Way(None);
+    facts.vehicles.iter().find(|vehicle| vehicle.id == id).map_or(NONE, |vehicle| &vehicle.way)
+}
+
+/// d = ξ̇ − v/R at the vehicle's next row; nothing for a target that moves as told.
+///
+/// A target that is held for a control period keeps up with the mean speed of its vehicle in it: v is that, not the speed at its begin.
+fn driven_by_following(track: &Track<'_>, cursor: usize, way: &Way, period_s: f64) -> f64 {
+    let (Some(path), Some(row)) = (&way.0, track.rows.get(cursor)) else { return 0.0 };
+    let (before, after) = (track.rows[cursor.saturating_sub(1)], track.rows.get(cursor + 1).unwrap_or(row));
+    let between_s = (after.t_ns - before.t_ns) as f64 / 1e9;
+    let v_dot = if between_s > 0.0 { (after.speed_mps - before.speed_mps) / between_s } else { 0.0 };
+    row.xi_rate - (row.speed_mps + 0.5 * period_s * v_dot) / path.at(row.xi).r()
 }
 
 fn interpolate(rows: &[&StateRow], cursor: &mut usize, t_ns: i64, gap_ns: i64) -> Option<f64> {
@@ -190,6 +221,21 @@ mod tests {
             rows.iter().map(|(ms, id, xi)| Record::State(state_row(ms * 1_000_000, id, *xi))).collect();
         let spread = Coordination::of(&tracks(&exact, &facts), &facts).spread();
         assert!(spread.iter().zip([0.0, 0.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{spread:?}");
+    }
+
+    #[test]
+    fn what_path_following_does_to_coordination_is_seen() {
+        let mut facts = facts();
+        let circle = common::path::line::Line::new(Default::default(), 0.0, 2.0).expect("a line");
+        facts.vehicles[0].way = Way(Some(std::sync::Arc::new(circle)));
+        let row =
+            |id: &str, xi_rate, speed_mps| Record::State(StateRow { xi_rate, speed_mps, ..state_row(0, id, 0.0) });
+        // R = 2: 0.6 m/s make 0.3, and ξ goes at 0.5; the other target moves as told.
+        let coordination = Coordination::of(&tracks(&[row("a", 0.5, 0.6), row("b", 0.9, 0.0)], &facts), &facts);
+        let d = coordination.disturbance.expect("one vehicle goes along");
+        assert!((d[0] - 0.2 / 2.0_f64.sqrt()).abs() < 1e-12, "{d:?}");
+        facts.vehicles[0].way = Way(None);
+        assert_eq!(Coordination::of(&tracks(&[row("a", 0.5, 0.6)], &facts), &facts).disturbance, None);
     }
 
     #[test]

@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+/// A fitted rate is good to this part: ripples and sampled laws cost that much.
+pub const FIT_PART: f64 = 0.02;
+
 /// An exponential decay fitted to the norm of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ExponentialFit {
@@ -15,6 +18,9 @@ pub struct ExponentialFit {
     pub decay_nats: f64,
     /// Median absolute deviation of the logarithm from the line: 0 for a pure exponential.
     pub scatter_nats: f64,
+    /// Whether vehicles were on their paths in that part, as statements about rates ask (d = 0): what path following did
+    /// to the error was small against its decay.
+    pub on_paths: bool,
 }
 
 /// The first instant from which on `values` stay at or below `threshold`; `None` if the last one is above, or there
@@ -72,7 +78,56 @@ pub fn fit_exponential(times: &[f64], norms: &[f64], period: Option<f64>) -> Opt
     let intercept = quantile(&sorted(&samples.iter().map(|(t, y)| y - slope * t).collect::<Vec<_>>()), 0.5)?;
     let residuals: Vec<f64> = samples.iter().map(|(t, y)| (y - slope * t - intercept).abs()).collect();
     let scatter_nats = quantile(&sorted(&residuals), 0.5)?;
-    Some(ExponentialFit { rate: -slope, from_s: first.0, to_s: last.0, decay_nats, scatter_nats })
+    Some(ExponentialFit { rate: -slope, from_s: first.0, to_s: last.0, decay_nats, scatter_nats, on_paths: true })
+}
+
+/// Fits the decay of a coordination error from `from_s` on, which is when the formation speed changed for the last time.
+///
+/// `disturbance` is ‖d‖, how fast path following drives the error (3.36). The part that is fitted is the longest in which it is
+/// below [`FIT_PART`] of the decay itself: an error that only follows the way to the paths has no rate of its own. Without
+/// such a part all is fitted, and the answer says that vehicles were not on their paths.
+pub fn fit_coordination(
+    times: &[f64],
+    norms: &[f64],
+    disturbance: Option<&[f64]>,
+    from_s: f64,
+    period: Option<f64>,
+) -> Option<ExponentialFit> {
+    let begin = times.partition_point(|time| *time < from_s - 1e-9);
+    let (times, norms) = (times.get(begin..)?, norms.get(begin..)?);
+    let all = fit_exponential(times, norms, period);
+    let Some(d) = disturbance.and_then(|d| d.get(begin..)) else { return all };
+    let all = all?;
+    // Both as they are bounded from each instant on, so that a zero on the way is no calm.
+    let [errors, d] = [norms, d].map(from_then_on);
+    let calm = |index: usize| d[index] <= FIT_PART * all.rate * errors[index];
+    let count = errors.len().min(d.len());
+    let (mut longest, mut since) = (0..0, None);
+    for index in 0..=count {
+        match (index < count && calm(index), since) {
+            (true, None) => since = Some(index),
+            (false, Some(start)) => {
+                since = None;
+                if index - start > longest.len() {
+                    longest = start..index;
+                }
+            }
+            _ => {}
+        }
+    }
+    // Modes that swing need more than one of their waves.
+    let long = |fit: &ExponentialFit| fit.decay_nats >= 2.0;
+    let calm = fit_exponential(&times[longest.clone()], &norms[longest], period).filter(long);
+    Some(calm.unwrap_or(ExponentialFit { on_paths: false, ..all }))
+}
+
+/// At each index, the largest value from there on.
+fn from_then_on(values: &[f64]) -> Vec<f64> {
+    let mut largest = values.to_vec();
+    for index in (1..largest.len()).rev() {
+        largest[index - 1] = largest[index - 1].max(largest[index]);
+    }
+    largest
 }
 
 /// Where the last fifth of a series begins, rounded to whole periods of the network if it has some.
@@ -159,6 +214,31 @@ mod tests {
         // The critically damped answer of a double integrator: rises first, then decays at 0.1.
         let rate = fitted(None, |t| (1.0 + t) * (-0.3 * t).exp() + 0.2 * (-0.1 * t).exp());
         assert!((rate - 0.1).abs() < 0.01, "{rate}");
+    }
+
+    #[test]
+    fn only_the_part_on_the_paths_counts() {
+        // e' = −0.4e + d with d = e^(−t): at first the error follows d, later it decays at its own rate.
+        let d = |t: f64| (-t).exp();
+        let e = |t: f64| (d(t) * -1.0 + 1.2 * (-0.4 * t).exp()) / 0.6;
+        let (times, norms) = series(|t| e(t).max(1e-12));
+        let disturbance: Vec<f64> = times.iter().map(|t| d(*t)).collect();
+        let fit = fit_coordination(&times, &norms, Some(&disturbance), 0.0, None).expect("decays");
+        assert!(fit.on_paths && fit.from_s > 4.0 && (fit.rate - 0.4).abs() < 0.004, "{fit:?}");
+        // A d that lasts longer than the error leaves it no rate of its own.
+        let (times, norms) = series(|t| (-0.1 * t).exp());
+        let lasting: Vec<f64> = times.iter().map(|t| 0.3 * (-0.1 * t).exp()).collect();
+        let fit = fit_coordination(&times, &norms, Some(&lasting), 0.0, None).expect("decays");
+        assert!(!fit.on_paths && (fit.rate - 0.1).abs() < 1e-6, "{fit:?}");
+        assert!(fit_coordination(&times, &norms, None, 0.0, None).is_some_and(|fit| fit.on_paths));
+    }
+
+    #[test]
+    fn what_was_before_the_last_change_of_speed_does_not_count() {
+        let (times, norms) = series(|t| if t < 50.0 { (-0.5 * t).exp() } else { (-0.1 * (t - 50.0)).exp() });
+        let fit = fit_coordination(&times, &norms, None, 50.0, None).expect("decays");
+        assert!((fit.rate - 0.1).abs() < 1e-6 && fit.from_s >= 50.0, "{fit:?}");
+        assert_eq!(fit_coordination(&times, &norms, None, 1e9, None), None);
     }
 
     #[test]

@@ -38,6 +38,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         id: format!("v{}", index + 1),
         pattern: Pattern::default(),
         path: if spatial { format!("helix-{}", index + 1) } else { format!("circle-{}", index + 1) },
+        way: Default::default(),
         message_bytes: (index == 2).then_some(44),
         planned: (0..=200).map(|step| path(f64::from(step) * 2.0, index, spatial)).collect(),
     });
@@ -53,6 +54,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         validity_s: Some(1.5),
         link_period_s: Some(10.0),
         guaranteed_rate: Some(0.012),
+        least_rate: None,
         guaranteed_factor: Some(1.3),
         predicted_speed: Some(0.5),
         predicted_along_bias_m: Some(0.0),
@@ -62,6 +64,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         formation_speed_at_the_end: Some(0.5),
         missing: Vec::new(),
         aborted: Vec::new(),
+        graph: None,
     }
 }
 

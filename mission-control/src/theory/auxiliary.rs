@@ -35,7 +35,10 @@ pub(super) fn rows_fixed(case: &Case<'_>, law: &Auxiliary) -> Vec<TheoryRow> {
             if fixed { "fixed" } else { "changes, delays or loses" }
         ),
         holds: Some(fixed && graph.is_undirected() && graph.is_connected()),
-        predicted: rate.map_or("–".into(), |rate| format!("slowest mode {rate:.5} 1/s where α₂ = 0")),
+        // α₂ does not vanish while δ ≠ 0: what decays is the distance from where it leads, so that no rate is guaranteed for e.
+        predicted: rate
+            .filter(|_| fixed)
+            .map_or("–".into(), |rate| format!("slowest mode {rate:.5} 1/s, down to the ball that α₂ leaves")),
         guaranteed_rate: None,
         measured: case.fitted_rate(),
     }]

@@ -3,16 +3,18 @@
 //! | figure | shows | source |
 //! |---|---|---|
 //! | `figure-2-8.svg` | roots of (2.38) while λ_p passes its critical value; ξ = 0.4, k = 0.25 | Figure 2.8, erratum 2.3 |
-//! | `eigenvalues.svg` | σ(L) of this mission's graph and the parabola of (3.73) within which a²/b must leave it | (3.73) |
+//! | `eigenvalues.svg` | the eigenvalues that a condition on a²/b is about, and the border that this mission's a²/b draws: to the right of it, it holds | (3.73), (3.85), (3.93) |
 //! | `loss-rate.svg` | the guaranteed rate over the loss rate α, for this mission's law | Theorem 4.4 |
 
-use common::graph::spectrum;
 use common::mission::Mission;
-use common::mission::file::LawChoice;
+use common::mission::file::{Laplacian, LawChoice};
 use common::theory::decoupling_2_37 as decoupling;
+use common::theory::proposition_3_6::{DirectedLaw, nonzero_spectrum};
 use common::theory::theorem_4_4::Coordination;
 
+use super::directed::with_leader;
 use super::network::Network;
+use super::surroundings::Way;
 use crate::results::{Chart, Curve, Figure};
 
 /// ξ \[rad/s\] and k \[rad²/s²\] of Figure 2.8.
@@ -21,7 +23,7 @@ const FIGURE_2_8: (f64, f64) = (0.4, 0.25);
 /// The figures about this mission, and Figure 2.8.
 pub fn figures(mission: &Mission) -> Vec<Figure> {
     let network = Network::of(mission);
-    [Some(figure_2_8()), eigenvalues(&network), loss_rate(mission, &network)].into_iter().flatten().collect()
+    [Some(figure_2_8()), eigenvalues(mission, &network), loss_rate(mission, &network)].into_iter().flatten().collect()
 }
 
 fn figure_2_8() -> Figure {
@@ -51,30 +53,60 @@ fn figure_2_8() -> Figure {
     .draw()
 }
 
-fn eigenvalues(network: &Network) -> Option<Figure> {
-    if network.graph.is_undirected() {
-        return None;
-    }
-    let mu = spectrum::eigenvalues(&network.graph.laplacian())?;
-    let widest = mu.iter().map(|mu| mu.re).fold(0.0, f64::max).max(1.0) * 1.2;
-    let threshold = mu.iter().filter(|mu| mu.norm() > 1e-9).map(|mu| mu.im * mu.im / mu.re).fold(0.0, f64::max);
-    let parabola = |sign: f64| {
-        (0..=100).map(|i| widest * f64::from(i) / 100.0).map(|re| (re, sign * (threshold * re).sqrt())).collect()
+/// The eigenvalues that a condition on a²/b is about, with the border that a²/b draws: to the right of it, the condition holds.
+fn eigenvalues(mission: &Mission, network: &Network) -> Option<Figure> {
+    let (law, ratio, normalised) = match &mission.law_choice {
+        LawChoice::Directed(law) => (DirectedLaw::OverC, law.a * law.a / law.b, false),
+        LawChoice::Solution2(law) if !network.graph.is_undirected() => {
+            // (3.85) speaks of equal R_i.
+            let way = Way::of(mission);
+            let r = *way.constant()?.first()?;
+            let equal = way.constant()?.iter().all(|other| (other - r).abs() <= 1e-9 * r);
+            if !equal {
+                return None;
+            }
+            (DirectedLaw::TimesC(1.0 / r), law.a * law.a / law.b, false)
+        }
+        LawChoice::TrulyDecentralised(law) => {
+            (DirectedLaw::Leader, law.a * law.a / law.b, law.laplacian == Laplacian::Normalised)
+        }
+        _ => return None,
+    };
+    let (graph, whose) = match &mission.law_choice {
+        LawChoice::TrulyDecentralised(law) => {
+            (with_leader(mission, &network.graph, law)?, "the graph with the virtual leader")
+        }
+        _ => (network.graph.clone(), "the graph of all links"),
+    };
+    let mu = nonzero_spectrum(&graph, normalised)?;
+    let threshold = law.threshold(&mu);
+    let equation = law.equation();
+    let reach = mu.iter().map(|mu| mu.re.max(mu.im.abs())).fold(0.0, f64::max).max(1.0) * 1.3;
+    let border = law.border(ratio, reach, 200);
+    let mirrored = border.iter().rev().map(|(re, im)| (*re, -im)).chain(border.iter().copied()).collect();
+    let verdict = if ratio > threshold {
+        "all are to the right of it, and it holds"
+    } else {
+        "not all are to the right of it, and it does not hold"
+    };
+    let shape = match law {
+        DirectedLaw::OverC => "Im² = (a²/b) Re",
+        DirectedLaw::TimesC(_) => "c² Im² = (a²/b) Re",
+        DirectedLaw::Leader => "Im² = (a²/b) Re |μ|²",
     };
     Some(
         Chart {
             name: "eigenvalues",
-            title: "Eigenvalues of L and condition (3.73)".into(),
+            title: format!("Eigenvalues and condition {equation}"),
             caption: format!(
-                "σ(L) of the graph of all links. Condition (3.73) asks that all of it lies within the parabola \
-                 Im² = (a²/b) Re; the one drawn, a²/b = {threshold:.4}, is the border."
+                "Eigenvalues μ ≠ 0 of {whose}, and the border {shape} of {equation} for this mission's a²/b = {ratio:.4}, which \
+                 must exceed {threshold:.4}: {verdict}."
             ),
             x: "Re μ".into(),
             y: "Im μ".into(),
             curves: vec![
-                Curve::dots("σ(L)", mu.iter().map(|mu| (mu.re, mu.im)).collect()),
-                Curve::line("border of (3.73)", parabola(1.0)),
-                Curve::line("", parabola(-1.0)),
+                Curve::dots("eigenvalues", mu.iter().map(|mu| (mu.re, mu.im)).collect()),
+                Curve::line(format!("a²/b = {ratio:.4}"), mirrored),
             ],
         }
         .draw(),

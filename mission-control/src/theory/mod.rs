@@ -6,10 +6,13 @@
 //!
 //! | what | source | file |
 //! |---|---|---|
+//! | what statements ask for beyond their network | – | `surroundings.rs` |
 //! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
+//! | matrices of the graph, all graphs that can be | section 3.1, Lemma 4.1 | `graph.rs` |
 //! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
 //! | learned speeds: leader, gateway, row | sections 2.2 to 2.4 | `learned_speeds.rs` |
 //! | solutions I to III | Propositions 3.4, 3.5 | `solutions.rs` |
+//! | path following with coordination | Propositions 3.1–3.3, 3.8, 3.9, Table 3.1 | `together.rs` |
 //! | weighted links, moving pattern | Remark 3.10, section 3.3.3 | `weights_and_patterns.rs` |
 //! | one-way links, one told vehicle | Propositions 3.6, 3.7, Remark 3.13 | `directed.rs` |
 //! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
@@ -27,29 +30,35 @@ mod delayed;
 mod directed;
 mod figures;
 mod fleet;
+mod graph;
 mod introduction;
 mod learned_speeds;
 mod network;
 mod premises;
 mod so_far;
 mod solutions;
+mod surroundings;
 mod switching;
 mod talk;
+mod together;
 mod watched;
 mod weights_and_patterns;
 
 use common::mission::Mission;
 use common::mission::file::LawChoice;
 use common::theory::Verdict;
-use common::theory::linear_coordination::Law;
+use common::theory::linear_coordination::{Late, Law};
 
 pub use figures::figures;
+pub use fleet::predicted_speed;
+pub use graph::graph_facts;
 pub use so_far::{SoFar, so_far};
 pub use talk::speed_factor;
 pub use watched::{envelope_over, guarantee_of_flight};
 
-use crate::results::{Summary, TheoryRow};
+use crate::results::{BELOW, FIT_PART, Summary, TheoryRow};
 use network::Network;
+use surroundings::{Disturbances, Way, undisturbed};
 
 /// A guaranteed decay of the coordination error: ‖e(t)‖ ≤ factor · exp(−rate t) ‖e(0)‖.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,11 +74,14 @@ struct Case<'a> {
     mission: &'a Mission,
     network: Network,
     summary: Option<&'a Summary>,
+    way: Way,
+    disturbances: Disturbances,
 }
 
 impl<'a> Case<'a> {
     fn new(mission: &'a Mission, summary: Option<&'a Summary>) -> Case<'a> {
-        Case { mission, network: Network::of(mission), summary }
+        let (way, disturbances) = (Way::of(mission), Disturbances::of(mission, summary));
+        Case { mission, network: Network::of(mission), summary, way, disturbances }
     }
 
     /// A measured value in words, or a dash before the flight.
@@ -85,18 +97,56 @@ impl<'a> Case<'a> {
             value: verdict.value,
             holds: Some(verdict.holds),
             predicted: match (verdict.norm_rate, verdict.holds) {
-                (Some(rate), _) => format!("‖e‖ decays at ≥ {rate:.5} 1/s"),
+                (Some(rate), true) => format!("‖e‖ decays at ≥ {rate:.5} 1/s"),
                 (None, true) => "agreement, no rate".into(),
-                (None, false) => "–".into(),
+                (_, false) => "–".into(),
             },
-            guaranteed_rate: verdict.norm_rate,
+            guaranteed_rate: verdict.norm_rate.filter(|_| verdict.holds),
             measured: self.fitted_rate(),
         }
     }
 
     /// The measured rate of coordination.
     fn fitted_rate(&self) -> String {
-        self.measured(|s| s.fleet.coordination.fit.as_ref().map_or("–".into(), |fit| format!("{:.5} 1/s", fit.rate)))
+        self.measured(|s| match &s.fleet.coordination.fit {
+            Some(fit) if fit.on_paths => format!("{:.5} 1/s", fit.rate),
+            Some(fit) => format!("{:.5} 1/s on the way to the paths: d lasts as long as e", fit.rate),
+            None => "–".into(),
+        })
+    }
+
+    /// Says so where the measured rate is below what the row guarantees, although its conditions hold.
+    ///
+    /// Rates are those of laws in continuous time. A law that is held for a control period acts half of that late, and what neighbours
+    /// say another period: what is left of the rate then is what a flight can show.
+    fn judged(&self, row: TheoryRow) -> TheoryRow {
+        let fit = self.summary.and_then(|s| s.fleet.coordination.fit).filter(|fit| fit.on_paths);
+        let (Some(fit), Some(guaranteed), Some(true)) = (fit, row.guaranteed_rate, row.holds) else { return row };
+        let least = |rate: f64| (1.0 - FIT_PART) * rate;
+        if fit.rate >= least(guaranteed) {
+            return row;
+        }
+        let measured = match self.held_rate().filter(|held| fit.rate >= least(*held)) {
+            Some(held) => {
+                let period = self.mission.control_period;
+                format!("{}; held for {period} the law reaches {held:.5} 1/s", row.measured)
+            }
+            None => format!("{}: {BELOW}", row.measured),
+        };
+        TheoryRow { measured, ..row }
+    }
+
+    /// What is left of the rate of a law that is held for a control period, where that is known.
+    fn held_rate(&self) -> Option<f64> {
+        solutions::late_rate(self, Late::held(self.mission.control_period.secs()))
+    }
+}
+
+/// The slowest mode in words: a root that occurs several times is no rate itself.
+fn mode_words((rate, times): (f64, usize)) -> String {
+    match times {
+        1 => format!("slowest mode {rate:.5} 1/s"),
+        _ => format!("every rate below {rate:.5} 1/s, a root {times} times"),
     }
 }
 
@@ -105,12 +155,22 @@ pub fn guarantee(mission: &Mission) -> Option<Guarantee> {
     guarantee_of(&Case::new(mission, None))
 }
 
+/// The least rate that a flight can show although what is guaranteed is kept: the law is held for a control period.
+pub fn least_rate(mission: &Mission) -> Option<f64> {
+    let case = Case::new(mission, None);
+    let rate = guarantee_of(&case)?.rate;
+    Some(case.held_rate().map_or(rate, |held| held.min(rate)))
+}
+
 fn guarantee_of(case: &Case<'_>) -> Option<Guarantee> {
     match &case.mission.law_choice {
         LawChoice::Introduction(_) => introduction::guarantee(case),
         LawChoice::Switching(_) => switching::guarantee(case),
         LawChoice::AuxiliarySwitching(law) => auxiliary::guarantee(case, law),
-        _ => None,
+        _ => {
+            let rates = law_rows(case).into_iter().filter_map(|row| row.guaranteed_rate);
+            rates.max_by(f64::total_cmp).map(|rate| Guarantee { rate, factor: None })
+        }
     }
 }
 
@@ -119,12 +179,16 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
     let case = Case::new(mission, summary);
     let mut rows = vec![fleet::graph(&case)];
     if mission.vehicles.len() > 1 {
+        let statements: Vec<TheoryRow> = law_rows(&case).into_iter().map(|row| case.judged(row)).collect();
         rows.extend(fleet::spectrum(&case));
-        rows.push(fleet::losses(&case));
-        rows.push(fleet::connected_in_mean(&case));
-        rows.extend(law_rows(&case));
+        rows.push(fleet::excused(fleet::losses(&case), &statements));
+        rows.push(fleet::excused(fleet::connected_in_mean(&case), &statements));
+        let together = together::table_3_1(&case, &statements);
+        rows.extend(statements);
+        rows.extend(together);
         rows.extend(talk::row_of_events(&case));
     }
+    rows.extend(together::path_following(&case));
     rows.push(fleet::speed(&case));
     rows.extend(fleet::bias(&case));
     rows.extend(watched::row(&case));
@@ -134,8 +198,6 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
 /// What the statements behind the mission's law ask for and promise.
 fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
     match &case.mission.law_choice {
-        LawChoice::Introduction(_) => introduction::rows(case),
-        LawChoice::LeaderIntegral(law) => introduction::rows_of_a_leader(case, law),
         LawChoice::LeaderFollower(law) => learned_speeds::rows_of_a_leader(case, law),
         LawChoice::Gateway(law) => {
             learned_speeds::rows_of_a_gateway(case, &law.gateway, law.a, vec![law.b, law.c], law.b0)
@@ -145,14 +207,23 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
         }
         LawChoice::Neighbours(law) => learned_speeds::rows_of_a_row(case, law),
         law @ (LawChoice::Alone(_) | LawChoice::SquareWave(_)) => learned_speeds::rows_of_nothing(case, law),
+        law => statements(case, law).into_iter().map(|row| undisturbed(case, row)).collect(),
+    }
+}
+
+/// Of the laws that speak of no failures.
+fn statements(case: &Case<'_>, law: &LawChoice) -> Vec<TheoryRow> {
+    match law {
+        LawChoice::Introduction(_) => introduction::rows(case),
+        LawChoice::LeaderIntegral(law) => introduction::rows_of_a_leader(case, law),
         LawChoice::Solution1(law) => solutions::rows(case, Law::SolutionOne { a: law.a }),
         LawChoice::Solution2(law) if !case.network.graph.is_undirected() => {
             directed::rows_of_solution_2(case, law.a, law.b)
         }
         LawChoice::Solution2(law) => solutions::rows(case, Law::SolutionTwo { a: law.a, b: law.b }),
         LawChoice::Solution3(law) => solutions::rows(case, Law::SolutionThree { a: law.a, b: law.b }),
-        LawChoice::Weighted(_) => weights_and_patterns::rows_of_weights(case),
-        LawChoice::MovingPattern(_) => weights_and_patterns::rows_of_a_pattern(case),
+        LawChoice::Weighted(law) => weights_and_patterns::rows_of_weights(case, law),
+        LawChoice::MovingPattern(law) => weights_and_patterns::rows_of_a_pattern(case, law),
         LawChoice::Directed(law) => directed::rows(case, law.a, law.b),
         LawChoice::TrulyDecentralised(law) => directed::rows_of_a_told_vehicle(case, law),
         LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
@@ -161,5 +232,12 @@ fn law_rows(case: &Case<'_>) -> Vec<TheoryRow> {
         LawChoice::DelayedEstimating(_) => talk::rows_of_estimating(case),
         LawChoice::KnownDelay(law) => talk::rows_of_known_delay(case, law),
         LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),
+        // Sections 2.2 to 2.4, which speak of failures too, are above.
+        LawChoice::LeaderFollower(_)
+        | LawChoice::Gateway(_)
+        | LawChoice::GatewayIntegral(_)
+        | LawChoice::Neighbours(_)
+        | LawChoice::Alone(_)
+        | LawChoice::SquareWave(_) => Vec::new(),
     }
 }

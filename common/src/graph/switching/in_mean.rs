@@ -62,6 +62,11 @@ impl InMean {
         Ok(InMean { cycle: window.nanos() / 2, dwell, groups, sets, stream, number: -1, turns: Vec::new() })
     }
 
+    /// Whose turns they are.
+    pub(super) fn groups(&self) -> &[Vec<usize>] {
+        &self.groups
+    }
+
     pub(super) fn is_up(&mut self, link: usize, t: Time) -> bool {
         let within = self.enter(t);
         let turn = self.turns.iter().find(|(from, to, _)| (*from..*to).contains(&within));

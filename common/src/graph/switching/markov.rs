@@ -42,6 +42,11 @@ impl Markov {
         Markov { walks, walk_of_link }
     }
 
+    /// Which walk each link follows; none, if it is never up.
+    pub(super) fn walk_of_link(&self) -> &[Option<usize>] {
+        &self.walk_of_link
+    }
+
     pub(super) fn is_up(&mut self, link: usize, t: Time) -> bool {
         self.walk_of_link[link].is_some_and(|walk| {
             let walk = &mut self.walks[walk];

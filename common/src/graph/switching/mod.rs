@@ -6,6 +6,7 @@
 mod in_mean;
 mod markov;
 mod periodic;
+mod possible;
 mod random;
 mod round_robin;
 mod schedule;
@@ -15,6 +16,7 @@ use crate::time::{Span, Time};
 use in_mean::InMean;
 use markov::Markov;
 use periodic::Periodic;
+pub use possible::Possible;
 use random::RandomLosses;
 use round_robin::RoundRobin;
 use schedule::Schedule;

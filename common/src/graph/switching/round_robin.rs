@@ -21,6 +21,11 @@ impl RoundRobin {
         (dwell > 0).then_some(RoundRobin { groups, dwell })
     }
 
+    /// Whose turns they are.
+    pub(super) fn groups(&self) -> &[Vec<usize>] {
+        &self.groups
+    }
+
     pub(super) fn is_up(&self, link: usize, t: Time) -> bool {
         self.group(self.turn(t)).is_some_and(|group| group.binary_search(&link).is_ok())
     }

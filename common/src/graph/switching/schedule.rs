@@ -53,6 +53,11 @@ impl Schedule {
         Some(schedule)
     }
 
+    /// Changes until it repeats, or until it never changes again.
+    pub(super) fn changes_per_lap(&self) -> usize {
+        self.changes.len()
+    }
+
     pub(super) fn is_up(&self, link: usize, t: Time) -> bool {
         self.calendar_of_link.get(link).is_some_and(|&calendar| covers(&self.calendars[calendar], self.fold(t.nanos())))
     }

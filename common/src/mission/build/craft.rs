@@ -236,7 +236,7 @@ fn limited(auv: Auv, limits: &Limits) -> Result<Auv, String> {
 }
 
 /// The largest |p'| over the range in which a path is used.
-fn largest_stretch(path: &dyn Path) -> f64 {
+pub(in crate::mission) fn largest_stretch(path: &dyn Path) -> f64 {
     let (from, to) = path.search_range();
     (0..=1000).map(|i| path.at(from + (to - from) * f64::from(i) / 1000.0).r()).fold(0.0, f64::max)
 }

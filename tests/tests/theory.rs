@@ -1,0 +1,182 @@
+//! What theory promises, and what it does not: each premise that a mission breaks is named, and takes the promise with it.
+
+use cpf_tests::{mission, mission_text, with};
+use mission_control::facts::facts;
+use mission_control::results::{Summary, TheoryRow, summarise};
+use mission_control::{simulate, theory};
+
+fn thesis(name: &str) -> String {
+    mission_text(&format!("missions/thesis/{name}.toml"))
+}
+
+fn row(text: &str, of: &str) -> TheoryRow {
+    let rows = theory::rows(&mission(text), None);
+    rows.iter().find(|row| row.name.contains(of)).unwrap_or_else(|| panic!("{of} is not in {rows:?}")).clone()
+}
+
+/// The row does not hold, says why, and promises nothing.
+fn assert_broken(text: &str, of: &str, why: &str) {
+    let row = row(text, of);
+    assert_eq!((row.holds, row.guaranteed_rate, row.predicted.as_str()), (Some(false), None, "–"), "{row:?}");
+    assert!(row.value.contains(why), "{why:?} in {row:?}");
+}
+
+fn fly(text: &str) -> (Vec<TheoryRow>, Summary) {
+    let mission = mission(text);
+    let mut recording =
+        bus::recording::Recording { complete: true, seed: mission.seed, ..bus::recording::Recording::default() };
+    let keep = |row| {
+        if let common::record::Row::Exact(record) = row {
+            recording.exact.push(record);
+        }
+    };
+    simulate::simulate(&mission, keep, |_| true).expect("the mission can be flown");
+    let summary = summarise(&recording, &facts(&mission));
+    (theory::rows(&mission, Some(&summary)), summary)
+}
+
+#[test]
+fn a_network_that_loses_takes_the_promise_of_chapter_2() {
+    let lossy = |name| with(&thesis(name), "[network]", "[network]\nloss = { bernoulli = { probability = 0.3 } }");
+    assert_broken(&lossy("fig-2-12"), "(2.35)", "changes, delays or loses");
+    assert_broken(&lossy("fig-2-15-a"), "(2.42)", "changes, delays or loses");
+    assert_broken(&lossy("fig-2-15-a"), "(2.43)", "changes, delays or loses");
+    assert_broken(&lossy("neighbours-in-a-row"), "neighbours in a row", "changes, delays or loses");
+    assert_broken(&lossy("leader-follower-failing-leader"), "(2.37)", "changes, delays or loses");
+}
+
+#[test]
+fn paths_that_are_no_circles_and_lines_take_it_too() {
+    let text = thesis("neighbours-in-a-row");
+    let path = text.lines().find(|line| line.starts_with("path")).expect("a path");
+    let text = with(&text, path, "path = { sinusoid = { amplitude_m = 0.2, wavelength_m = 20.0 } }");
+    assert_broken(&text, "neighbours in a row", "no circles and lines");
+}
+
+#[test]
+fn a_current_noise_or_a_failure_is_a_premise() {
+    let text = thesis("solution-1");
+    let first = "start = { x_m = 2.3, y_m = 0.2, yaw_deg = 90.0, speed_mps = 0.2 }";
+    let with_line = |line: &str| with(&text, first, &format!("{first}\n{line}"));
+    assert_eq!(row(&text, "Proposition 3.4").holds, Some(true));
+    assert_broken(&with_line("current = { velocity_mps = [0.3, 0.0, 0.0] }"), "Proposition 3.4", "a current (r1)");
+    assert_broken(&with_line("noise = { position_m = 0.01 }"), "Proposition 3.4", "noise (r1)");
+    let stuck = with_line("failure = { speed_stuck = { speed_mps = 0.1, from_s = 20.0 } }");
+    assert_broken(&stuck, "Proposition 3.4", "a failure (r1)");
+    assert_eq!(row(&stuck, "Fleet speed").predicted, "–");
+    // Limits: before the flight nobody knows; after it, what was.
+    let tight = with_line("limits = { force_n = 0.02 }");
+    assert!(row(&tight, "Proposition 3.4").value.contains("the flight will tell"));
+    let (rows, _) = fly(&with(&tight, "duration_s = 200.0", "duration_s = 20.0"));
+    let flown = rows.iter().find(|row| row.name.contains("Proposition 3.4")).expect("a row");
+    assert!(flown.holds == Some(false) && flown.value.contains("an actuator was at its limit (r1)"), "{flown:?}");
+}
+
+#[test]
+fn a_speed_that_steps_or_ends_is_named() {
+    let steps = "profile = [{ from_s = 0.0, speed = 0.5 }, { from_s = 60.0, speed = 0.3 }]";
+    let text = with(&thesis("eq-1-5-leader-integral"), "speed = 0.5", steps);
+    let leader = row(&text, "learns v_L");
+    assert!(leader.condition.contains("v_L constant") && leader.value.contains("the last time at 60 s"), "{leader:?}");
+    assert!(row(&thesis("truly-decentralised"), "Proposition 3.7").value.contains("the last time at 150 s"));
+    let stops = "profile = [{ from_s = 0.0, speed = 0.1 }, { from_s = 60.0, speed = 0.0 }]";
+    let text = with(&thesis("solution-1"), "speed = 0.1\n", &format!("{stops}\n"));
+    let following = row(&text, "conditions i and ii");
+    assert!(following.holds == Some(false) && following.value.contains("v_L = 0 from 60 s on"), "{following:?}");
+    assert_eq!(row(&text, "Table 3.1").holds, Some(false));
+}
+
+#[test]
+fn one_contact_and_silence_after_is_no_lemma_1_1() {
+    let fleet = with(
+        &thesis("fig-1-9"),
+        "[network]",
+        "[network]\nswitching = { intervals = { up = [{ from_s = 0.0, to_s = 5.0 }] } }",
+    );
+    let lemma = row(&fleet, "Lemma 1.1");
+    assert!(lemma.holds == Some(false) && lemma.guaranteed_rate.is_none(), "{lemma:?}");
+    assert!(lemma.value.contains("α = 1.0000") && lemma.value.contains("T = 10"), "{lemma:?}");
+    let periodic = row(&thesis("fig-1-10"), "Lemma 1.1");
+    assert!(periodic.guaranteed_rate.is_some_and(|rate| (rate - 0.4 / 3.0).abs() < 1e-9), "{periodic:?}");
+    assert!(periodic.value.contains("α = 0.3333") && periodic.value.contains("T = 3"), "{periodic:?}");
+}
+
+#[test]
+fn no_mission_of_the_thesis_is_below_what_is_guaranteed() {
+    // Those whose rates say most: joints of paths, one-way links, steps of the speed, weights, several equal roots.
+    for name in ["fig-3-7", "fig-3-9", "fig-3-10", "eq-3-62-weighted", "truly-decentralised", "prop-3-2", "fig-1-9"] {
+        let (rows, summary) = fly(&thesis(name));
+        let below: Vec<_> = rows.iter().filter(|row| row.is_below()).collect();
+        assert!(below.is_empty(), "{name}: {below:?}");
+        assert_ne!(summary.fleet.coordination.at_least_guaranteed, Some(false), "{name}");
+    }
+}
+
+#[test]
+fn where_paths_have_joints_no_rate_is_promised() {
+    let jumping = row(&thesis("fig-3-7"), "Proposition 3.5");
+    assert!(jumping.holds == Some(true) && jumping.guaranteed_rate.is_none(), "{jumping:?}");
+    assert!(jumping.value.contains("erratum 3.18") && jumping.condition.contains("d = 0"), "{jumping:?}");
+    assert!(row(&thesis("fig-3-9"), "Proposition 3.4").guaranteed_rate.is_some(), "R varies without a jump");
+}
+
+#[test]
+fn table_3_1_says_which_laws_go_together() {
+    for (name, holds, words) in [
+        ("solution-1", true, "Proposition 3.9"),
+        ("fig-3-10", true, "Proposition 3.9"),
+        ("fig-3-7", true, "Proposition 3.8"),
+        ("eq-3-70-pattern", true, "Proposition 3.8"),
+        ("prop-3-3", false, "×"),
+    ] {
+        let row = row(&thesis(name), "Table 3.1");
+        assert!(row.holds == Some(holds) && row.value.contains(words), "{name}: {row:?}");
+    }
+    // With sat(.) the table covers the marine vehicles too.
+    let saturated =
+        with(&thesis("prop-3-3"), "{ solution1 = { a = 1.0 } }", "{ solution3 = { a = 1.0, b = 0.25, x_m = 1.0 } }");
+    assert_eq!(row(&saturated, "Table 3.1").holds, Some(true));
+}
+
+#[test]
+fn speeds_and_values_are_those_of_the_mission() {
+    assert_eq!(row(&thesis("fig-2-4"), "Fleet speed").predicted, "–");
+    assert_eq!(row(&thesis("fig-2-15-b"), "Fleet speed").predicted, "0.08333 1/s");
+    let bias = row(&thesis("fig-4-2"), "Along-path bias");
+    assert!(bias.value.contains("|δ₁| = 0.3 > 0.0654"), "{bias:?}");
+    for name in ["eq-3-62-weighted", "eq-3-70-pattern"] {
+        assert!(row(&thesis(name), "Agreement").guaranteed_rate.is_some(), "{name}");
+    }
+    // Theorem 4.5 covers a fleet that is never connected, and nothing is missing then.
+    let losses = row(&thesis("ucm-one-link-at-a-time"), "Brief connectivity losses");
+    assert!(losses.holds.is_none() && losses.value.contains("Theorem 4.5"), "{losses:?}");
+}
+
+#[test]
+fn all_graphs_that_a_signal_can_take_are_looked_at_not_only_those_of_the_seed() {
+    let markov = "[network]\nswitching = { markov = { mean_up_s = 1000.0, mean_down_s = 1000.0 } }";
+    let fleet = mission(&with(&thesis("solution-1"), "[network]", markov));
+    let facts = theory::graph_facts(&fleet);
+    assert!(facts.taken.graphs > 2 && facts.taken.complete && facts.taken.connected == 1, "{:?}", facts.taken);
+    let text = facts.lines().join("\n");
+    for words in ["degrees", "adjacency A", "Laplacian", "incidence M", "Y² of L", "F₁", "F₂", "L₁₁", "λ₂"]
+    {
+        assert!(text.contains(words), "{words} in {text}");
+    }
+    let json = serde_json::to_value(&facts).expect("serialises");
+    assert_eq!(json["degrees"], serde_json::json!([2, 1, 1]));
+    assert_eq!(json["laplacian"][0], serde_json::json!([2.0, -1.0, -1.0]));
+}
+
+#[test]
+fn the_picture_of_the_eigenvalues_has_the_border_of_the_mission() {
+    let caption = |name: &str| {
+        let figures = theory::figures(&mission(&thesis(name)));
+        figures.iter().find(|figure| figure.name == "eigenvalues").expect("a picture").caption.clone()
+    };
+    let ring = caption("fig-3-10");
+    assert!(ring.contains("(3.73)") && ring.contains("a²/b = 4.0000") && ring.contains("0.5000"), "{ring}");
+    let told = caption("truly-decentralised");
+    assert!(told.contains("(3.93)") && told.contains("virtual leader") && told.contains("0.1396"), "{told}");
+    assert!(caption("eq-3-83").contains("(3.85)"));
+}
