@@ -15,7 +15,7 @@ use common::wire::vehicle::Phase;
 
 use crate::console::{Count, Progress};
 use crate::gallery::{GALLERY, Gallery};
-use crate::results::{Summary, TheoryRow, diff, export_csv, network_section};
+use crate::results::{ClockVerdict, Summary, TheoryRow, diff, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::measure::index_of;
 use crate::sweep::plan::{self, Plan as SweepPlan};
@@ -389,7 +389,7 @@ fn simulate(path: &Path, out: Option<&Path>, sets: &[String], seed: Option<u64>,
     let mission = changed(load(path)?, sets, seed).map_err(|reason| End(2, reason))?;
     warn(&theory::rows(&mission, None));
     let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
-    tell(&mission, &folder, outcome.phase, &summary, &[], json)
+    tell(&mission, &folder, outcome.phase, &summary, None, &[], json)
 }
 
 /// The mission with some of its keys at other values.
@@ -485,7 +485,15 @@ fn run_fleet(args: RunArgs) -> Ended {
         patience: args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64),
     };
     match fly(&plan) {
-        Ok(flown) => tell(&mission, &flown.folder, flown.phase, &flown.summary, &flown.missing, args.json),
+        Ok(flown) => tell(
+            &mission,
+            &flown.folder,
+            flown.phase,
+            &flown.summary,
+            flown.clock.verdict.as_ref(),
+            &flown.missing,
+            args.json,
+        ),
         Err(Failure::Unreachable(reason)) => Err(End(3, reason)),
         Err(Failure::Refused(reason)) => Err(End(1, reason)),
         Err(Failure::Files(reason)) => Err(End(4, reason)),
@@ -497,7 +505,15 @@ fn run_fleet(args: RunArgs) -> Ended {
 }
 
 /// What came of a flight, for a person or a pipe.
-fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missing: &[String], json: bool) -> Ended {
+fn tell(
+    mission: &Mission,
+    folder: &Path,
+    phase: Phase,
+    summary: &Summary,
+    clock: Option<&ClockVerdict>,
+    missing: &[String],
+    json: bool,
+) -> Ended {
     for text in missing {
         bus::remark!("warning: {text}");
     }
@@ -512,6 +528,7 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
             (m.half_duplex, "unheard while speaking"),
             (m.collision, "collided"),
             (m.corrupt, "corrupt"),
+            (m.receiver_absent, "with the receiver absent"),
         ]
         .iter()
         .filter(|(count, _)| *count > 0)
@@ -529,6 +546,9 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, summary: &Summary, missi
         if m.copied + m.copy_dropped + m.copy_in_flight > 0 {
             let (copied, dropped, in_flight) = (m.copied, m.copy_dropped, m.copy_in_flight);
             bus::tell!("  Second copies: {copied} delivered, {dropped} dropped, {in_flight} in flight");
+        }
+        if let Some(clock) = clock {
+            bus::tell!("  On the clock: {}", clock.text);
         }
         bus::tell!("  Coordination error at the end: {:.2e}", summary.fleet.coordination.last);
         bus::tell!("report: {}", folder.join("report.html").display());
@@ -630,7 +650,10 @@ fn export(run: &Path, format: Format, out: Option<PathBuf>) -> Ended {
         }
         Format::Network => {
             let path = out.join("network.toml");
-            std::fs::write(&path, network_section(&recording.exact)).map_err(failed)?;
+            let mission = Mission::parse(folder::MISSION, &recording.mission_toml)
+                .map_err(|faults| End(4, faults.to_string()))?;
+            let section = network_section(&recording.exact, mission.message_period());
+            std::fs::write(&path, section).map_err(failed)?;
             bus::tell!("the network of {} rows to {}", recording.exact.len(), path.display());
         }
     }

@@ -12,7 +12,7 @@ use common::record::Record;
 use serde::Serialize;
 
 use crate::facts::facts;
-use crate::results::{Account, Summary, write_run_folder};
+use crate::results::{Account, ClockSummary, Summary, write_run_folder};
 use crate::theory;
 
 /// Names of the files in a run folder.
@@ -106,7 +106,7 @@ impl HostFacts {
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
+pub fn finish(folder: &Path, host: &HostFacts) -> Result<(Summary, ClockSummary), String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
     write(&folder.join("host.json"), &json)?;
     let mut notes = vec![format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)];
@@ -118,7 +118,7 @@ pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn report(folder: &Path, notes: Vec<String>) -> Result<Summary, String> {
+pub fn report(folder: &Path, notes: Vec<String>) -> Result<(Summary, ClockSummary), String> {
     let recording = recording(folder)?;
     let mission = Mission::parse(MISSION, &recording.mission_toml).map_err(|faults| faults.to_string())?;
     let mut facts = facts(&mission);

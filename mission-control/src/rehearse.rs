@@ -28,7 +28,7 @@ pub fn rehearse(mission: &Arc<Mission>, out: Option<&Path>) -> Result<(PathBuf, 
     progress.done();
     let outcome = outcome?;
     let host = HostFacts::now("mission-control simulate", begun.elapsed().as_secs_f64(), Vec::new());
-    let summary = folder::finish(&folder, &host)?;
+    let (summary, _) = folder::finish(&folder, &host)?;
     Ok((folder, outcome, summary))
 }
 
@@ -78,5 +78,6 @@ fn t_ns(row: &Row) -> i64 {
         Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
         Row::Clock(ClockRecord::Ticks(row)) => row.t_ns,
         Row::Clock(ClockRecord::Note(row)) => row.t_ns,
+        Row::Clock(ClockRecord::Overrun(row)) => row.t_ns,
     }
 }

@@ -27,7 +27,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use crate::conduct::{Conduct, ConductInput, ConductOutput, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
-use crate::results::Summary;
+use crate::results::{ClockSummary, Summary};
 
 /// How long own processes may take to come up.
 const OWN_PATIENCE: Duration = Duration::from_secs(60);
@@ -58,6 +58,8 @@ pub struct Flown {
     pub phase: Phase,
     /// Its numbers.
     pub summary: Summary,
+    /// What depends on the machine.
+    pub clock: ClockSummary,
     /// What is missing, and why.
     pub missing: Vec<String>,
 }
@@ -169,8 +171,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         (_, false) => "mission-control run --attach",
     };
     let host = HostFacts::now(how, begun.elapsed().as_secs_f64(), missing.clone());
-    let summary = folder::finish(&folder, &host).map_err(Failure::Files)?;
-    Ok(Flown { folder, phase, summary, missing })
+    let (summary, clock) = folder::finish(&folder, &host).map_err(Failure::Files)?;
+    Ok(Flown { folder, phase, summary, clock, missing })
 }
 
 /// How late a vehicle may begin that did not begin in mid-flight \[s of wall clock\].

@@ -8,7 +8,7 @@ use std::path::Path;
 use bus::recording::Recording;
 use serde::Serialize;
 
-use super::{Facts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
+use super::{ClockSummary, Facts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
 
 /// What the caller has to tell in the report besides numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub fn write_run_folder(
     facts: &Facts,
     theory: impl FnOnce(&Summary) -> Vec<TheoryRow>,
     account: &Account,
-) -> io::Result<Summary> {
+) -> io::Result<(Summary, ClockSummary)> {
     let directory = directory.as_ref();
     let (summary, clock) = (summarise(recording, facts), summarise_clock(recording));
     let (figures, theory) = (figures(recording, facts), theory(&summary));
@@ -51,7 +51,7 @@ pub fn write_run_folder(
     write(&directory.join("theory.json"), &json(&theory)?)?;
     write(&directory.join("clock.json"), &json(&clock)?)?;
     write(&directory.join("report.html"), page.as_bytes())?;
-    Ok(summary)
+    Ok((summary, clock))
 }
 
 fn json(value: &impl Serialize) -> io::Result<Vec<u8>> {
@@ -109,7 +109,7 @@ mod tests {
             notes: vec!["simulated".into()],
             reproduce: vec!["mission-control simulate mission.toml --seed 42".into()],
         };
-        write_run_folder(directory, &fleet(spatial), &facts(spatial), theory, &account).expect("writes")
+        write_run_folder(directory, &fleet(spatial), &facts(spatial), theory, &account).expect("writes").0
     }
 
     fn files(directory: &Path) -> Vec<(OsString, Vec<u8>)> {

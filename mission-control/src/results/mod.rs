@@ -18,6 +18,7 @@ mod facts;
 mod figures;
 mod folder;
 pub(crate) mod network;
+mod punctuality;
 pub(crate) mod report;
 mod series;
 pub(crate) mod statistics;
@@ -33,11 +34,12 @@ pub use facts::{Facts, VehicleFacts};
 pub use figures::{Figure, figures};
 pub use folder::{Account, write_run_folder};
 pub use network::{Connectivity, LinkSummary, Network, Spread};
+pub use punctuality::ClockVerdict;
 pub use report::{Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
 pub use statistics::{ExponentialFit, fit_exponential, settling_time};
 pub use summary::{
     ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals, NoteSummary,
-    Summary, VehicleSummary, summarise, summarise_clock,
+    OverrunSummary, Summary, VehicleSummary, summarise, summarise_clock,
 };
 pub use trace::network_section;

@@ -153,3 +153,30 @@ fn a_speed_that_is_no_number_is_refused() {
         assert!(refusal(&ask(&mut hub, Time::from_secs(1.0), ToFleet::Speed { speed })).is_some());
     }
 }
+
+#[test]
+fn the_channel_knows_who_has_left_and_who_is_back() {
+    use common::record::Fate;
+    use common::wire::state::CoordinationState;
+
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let say = |hub: &mut Hub, at: f64, seq: u32| {
+        let state =
+            CoordinationState { mission: digest(HELIX), sender: 0, seq, made: Time::ZERO, xi: 1.0, scalar: None };
+        hub.handle(Time::from_secs(at), Some(HubInput::State(0, state.encode().into())));
+        // 5 s of delay; the link is up for the last 2.5 s of every 10 s.
+        hub.handle(Time::from_secs(at + 5.0), None);
+        outputs(hub).into_iter().find_map(|output| match output {
+            HubOutput::Settled(settled) => Some(settled.fate),
+            HubOutput::Deliver { settled, seat: 1, .. } => settled.map(|settled| settled.fate),
+            _ => None,
+        })
+    };
+    assert_eq!(say(&mut hub, 3.0, 30), Some(Fate::Delivered));
+    hub.handle(Time::from_secs(9.0), Some(HubInput::Left("auv2".into())));
+    assert_eq!(say(&mut hub, 13.0, 130), Some(Fate::ReceiverAbsent));
+    assert_eq!(say(&mut hub, 19.0, 190), Some(Fate::LinkDown), "the link would not have carried it either");
+    hub.handle(Time::from_secs(25.0), Some(joined("auv2")));
+    assert_eq!(say(&mut hub, 33.0, 330), Some(Fate::Delivered));
+}
