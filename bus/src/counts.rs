@@ -15,6 +15,8 @@ pub struct Counts {
     pub mission_out: u64,
     /// State-plane messages dropped because the program did not empty its queue.
     pub state_dropped: u64,
+    /// State-plane messages dropped on the way out, because the other end does not keep up or is gone.
+    pub state_unsent: u64,
     /// Mission-plane messages dropped because the program did not empty its queue.
     pub mission_dropped: u64,
     /// Mission-plane messages refused because the other end takes nothing and the backlog is full.
@@ -33,6 +35,7 @@ pub(crate) struct Tally {
     pub(crate) state_out: Counter,
     pub(crate) mission_out: Counter,
     pub(crate) state_dropped: Counter,
+    pub(crate) state_unsent: Counter,
     pub(crate) mission_dropped: Counter,
     pub(crate) backlogged: Counter,
     pub(crate) garbage: Counter,
@@ -40,6 +43,12 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
+    /// A packet that was to be handed to the program had to make place for a newer one.
+    pub(crate) fn drop_state(&self) {
+        self.state_in.take_back(1);
+        self.state_dropped.add(1);
+    }
+
     pub(crate) fn counts(&self) -> Counts {
         Counts {
             state_in: self.state_in.get(),
@@ -47,6 +56,7 @@ impl Tally {
             state_out: self.state_out.get(),
             mission_out: self.mission_out.get(),
             state_dropped: self.state_dropped.get(),
+            state_unsent: self.state_unsent.get(),
             mission_dropped: self.mission_dropped.get(),
             backlogged: self.backlogged.get(),
             garbage: self.garbage.get(),
@@ -65,7 +75,7 @@ impl Counter {
     pub(crate) fn add(&self, count: u64) {
         self.0.fetch_add(count, Ordering::Relaxed);
     }
-    /// Undoes so many [`add_one`](Self::add_one)s.
+    /// Undoes so many.
     pub(crate) fn take_back(&self, count: u64) {
         self.0.fetch_sub(count, Ordering::Relaxed);
     }

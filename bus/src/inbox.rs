@@ -4,12 +4,12 @@
 //! counted. A gate is shut until the two ends have shaken hands, and again when the line is lost, so that a program
 //! sees every packet after the line's beginning and before its end.
 
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use crate::counts::Tally;
-use crate::outbox::{ACK_EVERY, Outbox};
+use crate::outbox::{ACK_EVERY, Outbox, STATE_ACK_EVERY};
 use crate::plane::{Assembled, Assembly, BUNDLE, Frame, Plane, cost, unbundle};
 use crate::queue::{Feed, Refused};
 
@@ -20,9 +20,14 @@ pub(crate) type Shortcut = dyn Fn(Instant, &[u8]) -> bool + Send + Sync;
 pub(crate) struct Inbox<E> {
     events: Feed<E>,
     packet: Box<dyn Fn(Plane, Instant, Vec<u8>) -> E + Send + Sync>,
+    /// Told of each packet that had to make place for a newer one, which may be another line's.
+    dropped: Box<dyn Fn(&E) + Send + Sync>,
     shortcut: OnceLock<Box<Shortcut>>,
     phase: AtomicU8,
     gate: Mutex<Gate>,
+    /// What has arrived on the state plane, as [`cost`] counts, and how much of it was acknowledged.
+    states_taken: AtomicU64,
+    states_acknowledged: AtomicU64,
     tally: Arc<Tally>,
     pub(crate) outbox: Outbox,
 }
@@ -53,9 +58,12 @@ impl<E> Inbox<E> {
         outbox: Outbox,
         tally: Arc<Tally>,
         packet: impl Fn(Plane, Instant, Vec<u8>) -> E + Send + Sync + 'static,
+        dropped: impl Fn(&E) + Send + Sync + 'static,
     ) -> Inbox<E> {
         let (shortcut, phase, gate) = (OnceLock::new(), AtomicU8::new(WAITING), Mutex::default());
-        Inbox { events, packet: Box::new(packet), shortcut, phase, gate, tally, outbox }
+        let (states_taken, states_acknowledged) = (AtomicU64::new(0), AtomicU64::new(0));
+        let (packet, dropped) = (Box::new(packet), Box::new(dropped));
+        Inbox { events, packet, dropped, shortcut, phase, gate, states_taken, states_acknowledged, tally, outbox }
     }
 
     /// Lets state-plane packets be taken before they are queued.
@@ -115,7 +123,17 @@ impl<E> Inbox<E> {
     }
 
     /// A bundle of state-plane messages has arrived.
-    pub(crate) fn on_state(&self, mut bytes: &[u8]) {
+    pub(crate) fn on_state(&self, bytes: &[u8]) {
+        self.take_states(bytes);
+        // Taken or not, it takes no more room on the way here.
+        let taken = self.states_taken.fetch_add(cost(bytes), Ordering::Relaxed) + cost(bytes);
+        if taken - self.states_acknowledged.load(Ordering::Relaxed).min(taken) >= STATE_ACK_EVERY {
+            self.states_acknowledged.store(taken, Ordering::Relaxed);
+            self.outbox.acknowledge(&Frame::StatesTaken { taken });
+        }
+    }
+
+    fn take_states(&self, mut bytes: &[u8]) {
         let at = Instant::now();
         if bytes.len() > BUNDLE + Plane::State.limit() {
             self.tally.oversized.add_one();
@@ -149,12 +167,8 @@ impl<E> Inbox<E> {
             self.tally.state_in.add(1);
             Some((self.packet)(Plane::State, at, message.to_vec()))
         });
-        match self.events.droppable(messages) {
-            Some(dropped) => {
-                self.tally.state_in.take_back(dropped);
-                self.tally.state_dropped.add(dropped);
-            }
-            None => self.tally.state_in.take_back(came),
+        if !self.events.droppable(messages, &*self.dropped) {
+            self.tally.state_in.take_back(came);
         }
         if !bytes.is_empty() {
             self.tally.garbage.add_one();
@@ -171,15 +185,20 @@ impl<E> Inbox<E> {
             self.outbox.acknowledged(taken);
             return None;
         }
+        if let Some(Frame::StatesTaken { taken }) = frame {
+            drop(gate);
+            self.outbox.states_acknowledged(taken);
+            return None;
+        }
         gate.taken += cost(bytes);
         if gate.taken - gate.acknowledged >= ACK_EVERY || frame == Some(Frame::AckNow) {
             gate.acknowledged = gate.taken;
-            self.outbox.acknowledge(gate.taken);
+            self.outbox.acknowledge(&Frame::Ack { taken: gate.taken });
         }
         match frame {
             Some(Frame::Hello { nonce }) => return Some(Handshake::Hello(nonce)),
             Some(Frame::Welcome { nonce }) => return Some(Handshake::Welcome(nonce)),
-            Some(Frame::AckNow | Frame::Ack { .. }) => {}
+            Some(Frame::AckNow | Frame::Ack { .. } | Frame::StatesTaken { .. }) => {}
             Some(Frame::Whole(message)) if self.is_open() => {
                 if gate.assembly.abandon() {
                     self.tally.garbage.add_one();

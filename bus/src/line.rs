@@ -146,7 +146,7 @@ impl Line {
 
     /// Sends to the hub, from any thread, without ever waiting for it.
     ///
-    /// On the state plane the message is dropped if the hub does not keep up. On the mission plane it waits in the
+    /// On the state plane the oldest messages are dropped and counted if the hub does not keep up. On the mission plane it waits in the
     /// line's backlog; it is lost only with the line, which the program then hears as [`LineEvent::Lost`].
     pub fn send(&self, plane: Plane, bytes: &[u8]) -> Result<()> {
         let inbox = self.shared.inbox().filter(|inbox| inbox.lets_send()).ok_or(Error::NotConnected)?;
@@ -366,7 +366,9 @@ impl Keeper {
         let tally = Arc::clone(&self.shared.tally);
         let outbox = Outbox::new(&session, |plane| up_key(id, plane), Arc::clone(&tally))?;
         let packet = |plane, at, bytes| LineEvent::Packet { plane, at, bytes };
-        let inbox = Arc::new(Inbox::new(self.events.clone(), outbox, tally, packet));
+        let own = Arc::clone(&tally);
+        let dropped = move |_: &LineEvent| own.drop_state();
+        let inbox = Arc::new(Inbox::new(self.events.clone(), outbox, tally, packet, dropped));
 
         let down = Arc::clone(&inbox);
         session

@@ -1,13 +1,13 @@
 //! The words exchanged in the lobby: a participant asks for its line, the hub names a port or a reason.
 //!
-//! The request is a query on `cpf/join/<id>` with the parameters `version=1;nonce=<hex>`; the answer is the text
-//! `port=<n>;version=1`, or an error reply `<code>: <reason>`. The nonce tells one incarnation of a participant
+//! The request is a query on `cpf/join/<id>` with the parameters `version=2;nonce=<hex>`; the answer is the text
+//! `port=<n>;version=2`, or an error reply `<code>: <reason>`. The nonce tells one incarnation of a participant
 //! from the next.
 
 use std::fmt;
 
 /// Both ends must speak the same.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// The longest identity of a participant.
 const LONGEST_ID: usize = 32;

@@ -1,10 +1,11 @@
 //! The sending half of one line, the same at both ends. Sending never blocks the caller, nor anything else.
 //!
-//! The state plane may drop, so it is put straight into the transport. The mission plane may not, and a transport whose
-//! queue is full blocks: not only its sender but, when the peer is then held for dead, one of the few threads that serve
-//! *all* sessions of the process. So it is never filled: at most [`WINDOW`] is on its way, a quarter of what the queue
-//! holds; the rest waits here, and moves on when the other end acknowledges. In a steady exchange of small messages, as
-//! the stepped clock's, none ever waits.
+//! A transport whose queue is full drops the newest and tells nobody, or blocks: not only its sender but, when the peer is
+//! then held for dead, one of the few threads that serve *all* sessions of the process. So it is never filled: of the mission
+//! plane at most [`WINDOW`] is on its way, a quarter of what the queue holds, and of the state plane [`STATE_WINDOW`], half of
+//! it; the rest waits here, and moves on when the other end acknowledges. What waits of the mission plane is kept; of the state
+//! plane the oldest make place for the newest beyond [`STATE_BACKLOG`], and are counted. In a steady exchange of small
+//! messages, as the stepped clock's, none ever waits.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -16,12 +17,18 @@ use zenoh::{Session, Wait};
 
 use crate::counts::Tally;
 use crate::error::{Error, Result};
-use crate::plane::{Frame, Plane, bundle, cost, frames};
+use crate::plane::{BUNDLE, Frame, Plane, bundle, cost, frames};
 
 /// How much of the mission plane may be on its way.
 const WINDOW: u64 = 256 << 10;
 /// The other end acknowledges this often: what it has not acknowledged yet leaves room for the largest frame.
 pub(crate) const ACK_EVERY: u64 = WINDOW / 4;
+/// How much of the state plane may be on its way.
+const STATE_WINDOW: u64 = 512 << 10;
+/// The other end acknowledges this often.
+pub(crate) const STATE_ACK_EVERY: u64 = STATE_WINDOW / 8;
+/// The most of the state plane that waits here: about a thousand messages, for what is older helps nobody.
+const STATE_BACKLOG: usize = 2 * BUNDLE;
 /// The most that waits for one line.
 const BACKLOG_LIMIT: usize = 64 << 20;
 
@@ -32,6 +39,7 @@ pub(crate) struct Outbox {
     /// Acknowledgements go in a lane of their own, above the mission plane's: they must not wait behind it.
     acks: Publisher<'static>,
     queue: Mutex<Queue>,
+    states: Mutex<States>,
     changed: Condvar,
     tally: Arc<Tally>,
 }
@@ -46,6 +54,47 @@ struct Queue {
     /// Totals since the line was opened, as [`cost`] counts.
     sent: u64,
     taken: u64,
+}
+
+/// The state plane's way into the transport.
+#[derive(Debug, Default)]
+struct States {
+    /// Bundles with how many messages are in each, oldest first.
+    waiting: VecDeque<(Vec<u8>, u64)>,
+    waiting_bytes: usize,
+    closed: bool,
+    /// Totals since the line was opened, as [`cost`] counts.
+    sent: u64,
+    taken: u64,
+}
+
+impl States {
+    /// The oldest bundle, if there is room for it on its way.
+    fn next(&mut self) -> Option<(Vec<u8>, u64)> {
+        let cost = cost(&self.waiting.front()?.0);
+        if self.sent.saturating_sub(self.taken) + cost > STATE_WINDOW {
+            return None;
+        }
+        self.sent += cost;
+        self.pop()
+    }
+
+    fn pop(&mut self) -> Option<(Vec<u8>, u64)> {
+        let oldest = self.waiting.pop_front()?;
+        self.waiting_bytes -= oldest.0.len();
+        Some(oldest)
+    }
+
+    /// How many messages had to make place so that no more waits than may.
+    fn shorten(&mut self, most: usize) -> u64 {
+        let mut dropped = 0;
+        while self.waiting_bytes > most
+            && let Some((_, messages)) = self.pop()
+        {
+            dropped += messages;
+        }
+        dropped
+    }
 }
 
 impl Queue {
@@ -76,6 +125,7 @@ impl Outbox {
             mission: publisher(Plane::Mission, CongestionControl::Block, Priority::DataLow)?,
             acks: publisher(Plane::Mission, CongestionControl::Block, Priority::DataHigh)?,
             queue: Mutex::default(),
+            states: Mutex::default(),
             changed: Condvar::new(),
             tally,
         })
@@ -106,11 +156,37 @@ impl Outbox {
         Ok(())
     }
 
-    /// Sends so many state-plane messages at once.
+    /// Sends so many state-plane messages at once, as soon as the other end has taken enough of what was sent before.
     pub(crate) fn send_bundle(&self, bundle: Vec<u8>, messages: u64) -> Result<()> {
-        self.state.put(bundle).wait().map_err(|_| Error::NotConnected)?;
-        self.tally.state_out.add(messages);
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        if states.closed {
+            self.tally.state_unsent.add(messages);
+            return Err(Error::NotConnected);
+        }
+        states.waiting_bytes += bundle.len();
+        states.waiting.push_back((bundle, messages));
+        self.send_states(&mut states)
+    }
+
+    /// Gives the transport what may go, under the lock, so that the order is kept; what is too much is dropped.
+    fn send_states(&self, states: &mut States) -> Result<()> {
+        while let Some((bundle, messages)) = states.next() {
+            if self.state.put(bundle).wait().is_err() {
+                self.tally.state_unsent.add(messages);
+                return Err(Error::NotConnected);
+            }
+            self.tally.state_out.add(messages);
+        }
+        self.tally.state_unsent.add(states.shorten(STATE_BACKLOG));
         Ok(())
+    }
+
+    /// The other end has taken this much of the state plane.
+    pub(crate) fn states_acknowledged(&self, taken: u64) {
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.taken = states.taken.max(taken);
+        // A failure here is the session's end, which is noticed elsewhere.
+        let _ = self.send_states(&mut states);
     }
 
     /// Sends a frame of the line's own, in order with the messages.
@@ -118,10 +194,10 @@ impl Outbox {
         self.enqueue(self.lock(), std::iter::once(frame.encode()))
     }
 
-    /// Tells the other end how much of its mission plane has arrived.
-    pub(crate) fn acknowledge(&self, taken: u64) {
+    /// Tells the other end how much of one of its planes has arrived.
+    pub(crate) fn acknowledge(&self, taken: &Frame<'_>) {
         // It fails only with the session, whose end is noticed elsewhere.
-        let _ = self.acks.put(Frame::Ack { taken }.encode()).wait();
+        let _ = self.acks.put(taken.encode()).wait();
     }
 
     /// The other end has taken this much.
@@ -157,6 +233,10 @@ impl Outbox {
     /// No more is sent.
     pub(crate) fn close(&self) {
         self.lock().close();
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.closed = true;
+        self.tally.state_unsent.add(states.shorten(0));
+        drop(states);
         self.changed.notify_all();
     }
 
@@ -187,5 +267,45 @@ impl Outbox {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Whatever the other end takes, no more is on its way or waits than may; what is lost is the oldest and is counted,
+        /// and the rest goes in order.
+        #[test]
+        fn the_oldest_states_make_place_and_every_message_is_accounted_for(
+            steps in prop::collection::vec((1usize..40_000, any::<bool>()), 1..200)
+        ) {
+            let mut states = States::default();
+            let (mut sent, mut dropped) = (Vec::new(), 0);
+            for (number, (size, takes)) in (1u64..).zip(&steps) {
+                states.waiting_bytes += size;
+                // The number of messages tells the bundles apart.
+                states.waiting.push_back((vec![0; *size], number));
+                if *takes {
+                    states.taken = states.sent;
+                }
+                while let Some((_, messages)) = states.next() {
+                    sent.push(messages);
+                }
+                dropped += states.shorten(STATE_BACKLOG);
+                prop_assert!(states.sent - states.taken <= STATE_WINDOW);
+                prop_assert!(states.waiting.iter().map(|(bundle, _)| bundle.len()).sum::<usize>() <= STATE_BACKLOG);
+            }
+            prop_assert!(sent.is_sorted());
+            let waiting: u64 = states.waiting.iter().map(|(_, messages)| messages).sum();
+            let all: u64 = (1..=steps.len() as u64).sum();
+            prop_assert_eq!(sent.iter().sum::<u64>() + dropped + waiting, all);
+            if steps.iter().all(|(_, takes)| *takes) {
+                prop_assert_eq!(dropped, 0, "who keeps up loses nothing");
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! | plane | carries | when the other end is slow | largest message |
 //! |---|---|---|---|
-//! | state | one small coordination message per period | the message is dropped: a newer one follows | 8 KiB, in bundles |
+//! | state | one small coordination message per period | the oldest that wait are dropped and counted: newer ones follow | 8 KiB, in bundles |
 //! | mission | missions, commands, the stepped clock, logs | the message waits in the line's backlog | 4 MiB, in frames of 32 KiB |
 //!
 //! A session of its own carries each line, so the keys name the participant only to be readable by outside tools.
@@ -81,6 +81,7 @@ const HELLO: u8 = 0x10;
 const WELCOME: u8 = 0x11;
 const ACK: u8 = 0x12;
 const ACK_NOW: u8 = 0x13;
+const STATES_TAKEN: u8 = 0x14;
 
 /// One frame of the mission plane, little-endian after a byte that says which.
 #[derive(Debug, PartialEq, Eq)]
@@ -97,6 +98,8 @@ pub(crate) enum Frame<'a> {
     Ack { taken: u64 },
     /// Please acknowledge at once.
     AckNow,
+    /// How much of the state plane has arrived since the line was opened, as [`cost`] counts it.
+    StatesTaken { taken: u64 },
 }
 
 impl<'a> Frame<'a> {
@@ -118,6 +121,7 @@ impl<'a> Frame<'a> {
             HELLO => Frame::Hello { nonce: number(rest)? },
             WELCOME => Frame::Welcome { nonce: number(rest)? },
             ACK => Frame::Ack { taken: number(rest)? },
+            STATES_TAKEN => Frame::StatesTaken { taken: number(rest)? },
             ACK_NOW if rest.is_empty() => Frame::AckNow,
             _ => return None,
         })
@@ -149,6 +153,7 @@ impl<'a> Frame<'a> {
             Frame::Welcome { nonce } => numbered(WELCOME, nonce),
             Frame::Ack { taken } => numbered(ACK, taken),
             Frame::AckNow => vec![ACK_NOW],
+            Frame::StatesTaken { taken } => numbered(STATES_TAKEN, taken),
         }
     }
 }
@@ -333,6 +338,7 @@ mod tests {
             for frame in [
                 Frame::Whole(&piece), Frame::Part { message, index, total, piece: &piece },
                 Frame::Hello { nonce }, Frame::Welcome { nonce }, Frame::Ack { taken: nonce }, Frame::AckNow,
+                Frame::StatesTaken { taken: nonce },
             ] {
                 let bytes = frame.encode();
                 prop_assert_eq!(Frame::decode(&bytes), Some(frame));

@@ -103,17 +103,16 @@ pub(crate) enum Refused {
 }
 
 impl<E> Feed<E> {
-    /// Packets that may be dropped; how many others, the oldest, had to make place. None if the program listens no more.
-    pub(crate) fn droppable(&self, events: impl Iterator<Item = E>) -> Option<u64> {
+    /// Packets that may be dropped. Others, the oldest, may have to make place: `dropped` is told which. False if the program
+    /// listens no more.
+    pub(crate) fn droppable(&self, events: impl Iterator<Item = E>, mut dropped: impl FnMut(&E)) -> bool {
         let mut line = self.0.lock();
         if !line.listening {
-            return None;
+            return false;
         }
-        let mut dropped = 0;
         for event in events {
             if line.due.droppable.len() >= self.0.capacity {
-                line.due.droppable.pop_front();
-                dropped += 1;
+                line.due.droppable.pop_front().iter().for_each(|(_, oldest)| dropped(oldest));
             } else {
                 self.0.droppable.fetch_add(1, Ordering::Release);
             }
@@ -123,7 +122,7 @@ impl<E> Feed<E> {
         if !line.patient {
             self.0.wake(&mut line);
         }
-        Some(dropped)
+        true
     }
 
     /// An event that must not be dropped.
@@ -357,7 +356,7 @@ mod tests {
     fn a_waiting_message_comes_before_a_passed_deadline_and_closing_after_the_last_message() {
         let (feed, events) = queue(9);
         feed.lasting(1).expect("room");
-        feed.droppable([2].into_iter());
+        feed.droppable([2].into_iter(), |_| ());
         let passed = Some(Instant::now());
         assert_eq!(recv_until(&events, passed), Wake::Message(1));
         assert_eq!(recv_until(&events, None), Wake::Message(2));
@@ -384,7 +383,7 @@ mod tests {
     #[test]
     fn patience_is_not_disturbed_by_packets() {
         let (feed, events) = queue(9);
-        feed.droppable([1].into_iter());
+        feed.droppable([1].into_iter(), |_| ());
         let soon = Some(Instant::now() + Duration::from_millis(1));
         assert_eq!(events.wait(soon, true), Wake::Deadline);
         feed.lasting(2).expect("room");
@@ -396,7 +395,7 @@ mod tests {
     fn who_does_not_listen_is_sent_nothing() {
         let (feed, events) = queue(1);
         drop(events);
-        assert_eq!(feed.droppable([1].into_iter()), None);
+        assert!(!feed.droppable([1].into_iter(), |_| ()));
         assert_eq!(feed.lasting(1), Err(Refused::Nobody));
         assert!(!feed.announce(1));
     }
@@ -409,10 +408,10 @@ mod tests {
         ) {
             let (feed, events) = queue(capacity);
             let bell = events.bell();
-            let (mut dropped, mut refused) = (0, 0);
+            let (mut dropped, mut refused) = (Vec::new(), 0);
             for (number, droppable) in sent.iter().enumerate() {
                 match droppable {
-                    true => dropped += feed.droppable([number].into_iter()).expect("listening") as usize,
+                    true => prop_assert!(feed.droppable([number].into_iter(), |oldest| dropped.push(*oldest))),
                     false => refused += usize::from(feed.lasting(number) == Err(Refused::Full)),
                 }
             }
@@ -424,7 +423,7 @@ mod tests {
             expected.extend(&others[..others.len().min(capacity)]);
             expected.sort_unstable();
             prop_assert_eq!(came, expected);
-            prop_assert_eq!(dropped, packets.len().saturating_sub(capacity));
+            prop_assert_eq!(&dropped[..], &packets[..packets.len().saturating_sub(capacity)]);
             prop_assert_eq!(refused, others.len().saturating_sub(capacity));
             prop_assert!(!bell.is_crowded());
         }

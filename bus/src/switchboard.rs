@@ -212,7 +212,7 @@ impl Switchboard {
 
     /// Sends to one participant, from any thread, without ever waiting for it.
     ///
-    /// On the state plane the message is dropped if the participant does not keep up. On the mission plane it waits in
+    /// On the state plane the oldest messages are dropped and counted if the participant does not keep up. On the mission plane it waits in
     /// the line's backlog; it is lost only with the line, which the hub then hears as [`HubEvent::Left`].
     pub fn send(&self, line: LineId, plane: Plane, bytes: &[u8]) -> Result<()> {
         let line = self.lines.get(line).ok_or(Error::NoSuchLine)?;
@@ -222,10 +222,11 @@ impl Switchboard {
 
     /// Puts a state-plane message with those that the next [`flush`](Switchboard::flush) sends to this participant.
     ///
-    /// Messages that travel together cost the transport as much as one. A bundle that is full goes at once.
-    pub fn post(&mut self, line: LineId, message: &[u8]) {
+    /// Messages that travel together cost the transport as much as one. A bundle that is full goes at once: the
+    /// moment at which it was handed to the session, if it was.
+    pub fn post(&mut self, line: LineId, message: &[u8]) -> Option<Instant> {
         if message.len() > Plane::State.limit() {
-            return;
+            return None;
         }
         if self.posted.len() <= line.index() {
             self.posted.resize(line.index() + 1, Posted::default());
@@ -236,21 +237,25 @@ impl Switchboard {
         }
         bundle(&mut posted.bundle, message);
         posted.messages += 1;
-        if posted.bundle.len() >= BUNDLE {
-            Switchboard::dispatch(&self.lines, line, posted);
-            self.addressed.retain(|other| *other != line);
+        if posted.bundle.len() < BUNDLE {
+            return None;
         }
+        let at = Switchboard::dispatch(&self.lines, line, posted);
+        self.addressed.retain(|other| *other != line);
+        Some(at)
     }
 
-    /// Sends what was posted, without waiting for anybody; how many messages.
+    /// Sends what was posted, without waiting for anybody; how many messages. `gone` is told when those of a line were
+    /// handed to its session.
     ///
-    /// What a participant cannot be sent is dropped, as the state plane may.
-    pub fn flush(&mut self) -> usize {
+    /// What a participant cannot be sent is dropped, as the state plane may, and counted.
+    pub fn flush(&mut self, mut gone: impl FnMut(LineId, Instant)) -> usize {
         let mut messages = 0;
         for line in self.addressed.drain(..) {
             let posted = &mut self.posted[line.index()];
             messages += posted.messages as usize;
-            Switchboard::dispatch(&self.lines, line, posted);
+            let at = Switchboard::dispatch(&self.lines, line, posted);
+            gone(line, at);
         }
         messages
     }
@@ -260,12 +265,17 @@ impl Switchboard {
         self.addressed.is_empty()
     }
 
-    fn dispatch(lines: &Lines, line: LineId, posted: &mut Posted) {
+    /// Hands messages to a line's session; the moment at which that was done.
+    fn dispatch(lines: &Lines, line: LineId, posted: &mut Posted) -> Instant {
         let Posted { bundle, messages } = std::mem::take(posted);
-        if let Some(inbox) = lines.get(line).and_then(|line| line.inbox()).filter(|inbox| inbox.is_open()) {
+        let line = lines.get(line);
+        let inbox = line.as_ref().and_then(|line| line.inbox());
+        match inbox.filter(|inbox| inbox.is_open()) {
             // It fails only with the session, whose end is noticed elsewhere.
-            let _ = inbox.outbox.send_bundle(bundle, messages);
+            Some(inbox) => _ = inbox.outbox.send_bundle(bundle, messages),
+            None => line.iter().for_each(|line| line.tally.state_unsent.add(messages)),
         }
+        Instant::now()
     }
 
     /// Lets state-plane packets be taken as they arrive, on the transport's threads and before they are queued. One that
@@ -279,12 +289,6 @@ impl Switchboard {
         self.lines.get(line).map(|line| line.id.clone())
     }
 
-    /// State-plane packets that were dropped because the program did not empty its queue, over all lines.
-    pub fn dropped(&self) -> u64 {
-        let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner);
-        lines.iter().map(|line| line.tally.state_dropped.get()).sum()
-    }
-
     /// What has passed on a line so far, over all of its sessions.
     pub fn counts(&self, line: LineId) -> Option<Counts> {
         self.lines.get(line).map(|line| line.tally.counts())
@@ -293,7 +297,7 @@ impl Switchboard {
     /// Lets participants take what was sent to them (for a second at most), then closes every line and the lobby.
     /// Dropping does the same.
     pub fn close(&mut self) {
-        self.flush();
+        self.flush(|_, _| ());
         let lines = self.lines.0.read().unwrap_or_else(PoisonError::into_inner).clone();
         let deadline = Instant::now() + FAREWELL;
         let open: Vec<_> = lines.iter().filter_map(|line| line.inbox()).filter(|inbox| inbox.is_open()).collect();
@@ -509,9 +513,16 @@ impl Clerk {
         let hub_line = self.lines.get(line).ok_or(Error::NoSuchLine)?;
         let tally = Arc::clone(&hub_line.tally);
         let outbox = Outbox::new(&session, |plane| down_key(id, plane), Arc::clone(&tally))?;
-        let inbox = Arc::new(Inbox::new(self.events.clone(), outbox, tally, move |plane, at, bytes| {
-            HubEvent::Packet { line, plane, at, bytes }
-        }));
+        let packet = move |plane, at, bytes| HubEvent::Packet { line, plane, at, bytes };
+        let lines = Arc::downgrade(&self.lines);
+        let dropped = move |event: &HubEvent| {
+            if let HubEvent::Packet { line, .. } = event
+                && let Some(line) = lines.upgrade().and_then(|lines| lines.get(*line))
+            {
+                line.tally.drop_state();
+            }
+        };
+        let inbox = Arc::new(Inbox::new(self.events.clone(), outbox, tally, packet, dropped));
 
         if self.shortcut.get().is_some() {
             let shortcut = Arc::clone(&self.shortcut);

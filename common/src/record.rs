@@ -63,11 +63,13 @@ pub enum Fate {
     CopyDropped,
     /// A second copy was still under way when the mission ended.
     CopyInFlight,
+    /// There was no process of the receiver when it arrived: killed, or its line down.
+    ReceiverAbsent,
 }
 
 impl Fate {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Fate; 12] = [
+    pub const ALL: [Fate; 13] = [
         Fate::Delivered,
         Fate::Lost,
         Fate::LinkDown,
@@ -80,10 +82,11 @@ impl Fate {
         Fate::Copied,
         Fate::CopyDropped,
         Fate::CopyInFlight,
+        Fate::ReceiverAbsent,
     ];
 
     /// The causes for which a message is dropped.
-    pub const DROPS: [Fate; 7] = [
+    pub const DROPS: [Fate; 8] = [
         Fate::Lost,
         Fate::OutOfRange,
         Fate::LinkDown,
@@ -91,6 +94,7 @@ impl Fate {
         Fate::HalfDuplex,
         Fate::Collision,
         Fate::Corrupt,
+        Fate::ReceiverAbsent,
     ];
 
     /// Whether it is that of a second copy, which nobody sent.
@@ -113,6 +117,7 @@ impl Fate {
             Fate::Copied => "copied",
             Fate::CopyDropped => "copy_dropped",
             Fate::CopyInFlight => "copy_in_flight",
+            Fate::ReceiverAbsent => "receiver_absent",
         }
     }
 }
@@ -149,7 +154,8 @@ pub struct Settled {
     pub due_ns: i64,
     /// Its fate.
     pub fate: Fate,
-    /// In real time, for a message that was delivered: how much later than due \[ns of wall clock\].
+    /// In real time, for a message that was delivered: how much later than due it was handed to the receiver's session
+    /// \[ns of wall clock\].
     pub late_ns: Option<i64>,
 }
 
@@ -237,6 +243,44 @@ pub struct TicksRow {
     pub worst_late_ns: i64,
 }
 
+/// Where messages were dropped that the network did not mean to drop: a queue of a program or a session was full, and the
+/// oldest made place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Overrun {
+    /// At the vehicle, on its way to the emulator.
+    AtSender,
+    /// At the emulator, before it could decide about them: they are in no ledger.
+    BeforeEmulator,
+    /// At the emulator, on the way to this vehicle: the ledger has them as delivered.
+    ToReceiver,
+    /// In the vehicle's own queue, before it could look at them.
+    AtReceiver,
+}
+
+impl Overrun {
+    /// In words.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Overrun::AtSender => "on the way to the emulator",
+            Overrun::BeforeEmulator => "before the emulator could decide about them",
+            Overrun::ToReceiver => "on the way to the receiver, after they were booked as delivered",
+            Overrun::AtReceiver => "in the receiver's own queue",
+        }
+    }
+}
+
+/// Messages that were dropped for want of time or room since the last such row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[allow(missing_docs, reason = "plain")]
+pub struct OverrunRow {
+    pub t_ns: i64,
+    /// Whose messages, or on the way to whom.
+    pub vehicle: Name,
+    pub place: Overrun,
+    pub count: u64,
+}
+
 /// A line for people: a warning, a rejoin, a refused message, with how often it happened. What a vehicle warns of at
 /// the end of its flight follows from the mission ([`Record::Warning`]); all else is of the clock ([`ClockRecord::Note`]).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -255,6 +299,7 @@ pub enum ClockRecord {
     Achieved(AchievedRow),
     Ticks(TicksRow),
     Note(NoteRow),
+    Overrun(OverrunRow),
 }
 
 /// Any row.

@@ -16,7 +16,7 @@ use common::wire::vehicle::Phase;
 use crate::console::{Count, Progress};
 use crate::gallery::{GALLERY, Gallery};
 use crate::results::report::told;
-use crate::results::{Summary, TheoryRow, compare as compare_runs, export_csv, network_section};
+use crate::results::{ClockVerdict, Summary, TheoryRow, compare as compare_runs, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::measure::index_of;
 use crate::sweep::plan::{self, Plan as SweepPlan};
@@ -460,7 +460,7 @@ fn simulate(path: &Path, out: Option<&Path>, sets: &[String], seed: Option<u64>,
     warn(&mission, &theory::rows(&mission, None));
     let (folder, outcome, summary) = rehearse::rehearse(&mission, out).map_err(|error| End(4, error))?;
     let sound = outcome.phase == Phase::Finished && outcome.aborted.is_empty();
-    tell(&mission, &folder, outcome.phase, sound, &summary, json)
+    tell(&mission, &folder, outcome.phase, sound, &summary, None, json)
 }
 
 /// The mission with some of its keys at other values.
@@ -557,7 +557,10 @@ fn run_fleet(args: RunArgs) -> Ended {
         patience: args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64),
     };
     match fly(&plan) {
-        Ok(flown) => tell(&mission, &flown.folder, flown.phase, flown.sound, &flown.summary, args.json),
+        Ok(flown) => {
+            let clock = flown.clock.verdict.as_ref();
+            tell(&mission, &flown.folder, flown.phase, flown.sound, &flown.summary, clock, args.json)
+        }
         Err(Failure::Unreachable(reason)) => Err(End(3, reason)),
         Err(Failure::Refused(reason)) => Err(End(1, reason)),
         Err(Failure::Files(reason)) => Err(End(4, reason)),
@@ -569,7 +572,15 @@ fn run_fleet(args: RunArgs) -> Ended {
 }
 
 /// What came of a flight, for a person or a pipe.
-fn tell(mission: &Mission, folder: &Path, phase: Phase, sound: bool, summary: &Summary, json: bool) -> Ended {
+fn tell(
+    mission: &Mission,
+    folder: &Path,
+    phase: Phase,
+    sound: bool,
+    summary: &Summary,
+    clock: Option<&ClockVerdict>,
+    json: bool,
+) -> Ended {
     // On standard error, so that a pipe gets the numbers alone; who gave up and what is missing is among them.
     for text in &summary.warnings {
         bus::remark!("warning: {text}");
@@ -589,6 +600,7 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, sound: bool, summary: &S
             (m.half_duplex, "unheard while speaking"),
             (m.collision, "collided"),
             (m.corrupt, "corrupt"),
+            (m.receiver_absent, "with the receiver absent"),
         ]
         .iter()
         .filter(|(count, _)| *count > 0)
@@ -606,6 +618,9 @@ fn tell(mission: &Mission, folder: &Path, phase: Phase, sound: bool, summary: &S
         if m.copied + m.copy_dropped + m.copy_in_flight > 0 {
             let (copied, dropped, in_flight) = (m.copied, m.copy_dropped, m.copy_in_flight);
             bus::tell!("  Second copies: {copied} delivered, {dropped} dropped, {in_flight} in flight");
+        }
+        if let Some(clock) = clock {
+            bus::tell!("  On the clock: {}", clock.text);
         }
         bus::tell!("  {}", coordination_at_end(summary));
         bus::tell!("report: {}", folder.join("report.html").display());
@@ -734,7 +749,10 @@ fn export(run: &Path, format: Format, out: Option<PathBuf>) -> Ended {
         }
         Format::Network => {
             let path = out.join("network.toml");
-            std::fs::write(&path, network_section(&recording.exact)).map_err(failed)?;
+            let mission = Mission::parse(folder::MISSION, &recording.mission_toml)
+                .map_err(|faults| End(4, faults.to_string()))?;
+            let section = network_section(&recording.exact, mission.message_period());
+            std::fs::write(&path, section).map_err(failed)?;
             bus::tell!("the network of {} rows to {}", recording.exact.len(), path.display());
         }
     }

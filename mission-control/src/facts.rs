@@ -41,7 +41,7 @@ pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
         description: mission.about.clone(),
         vehicles: (0..mission.vehicles.len()).map(|i| vehicle(mission, file.as_ref(), i)).collect(),
         links: mission.links.iter().map(|link| (name(link.from), name(link.to))).collect(),
-        message_bytes: (0..mission.vehicles.len()).map(|i| mission.message_bytes(i) as u64).max().unwrap_or(0),
+        message_bytes: (0..mission.vehicles.len()).map(|i| bytes_on_air(mission, i)).max().unwrap_or(0),
         duration_s: mission.end.secs(),
         control_period_s: mission.control_period.secs(),
         validity_s: mission.validity.map(|validity| validity.secs()),
@@ -112,8 +112,14 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         pattern: plan.pattern,
         path: path.to_string(),
         planned,
-        message_bytes: Some(mission.message_bytes(index) as u64),
+        message_bytes: Some(bytes_on_air(mission, index)),
     }
+}
+
+/// Size of a message as the medium packs it, or its own.
+fn bytes_on_air(mission: &Mission, vehicle: usize) -> u64 {
+    let packed = mission.medium.as_ref().and_then(|medium| medium.packet);
+    packed.unwrap_or_else(|| mission.message_bytes(vehicle)) as u64
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use common::time::Time;
 use serde::{Deserialize, Serialize};
 
 use crate::facts::{facts_at, speed_in_force};
-use crate::results::{Account, Summary, Theory, write_run_folder};
+use crate::results::{Account, ClockSummary, Summary, Theory, write_run_folder};
 use crate::theory;
 
 /// Names of the files in a run folder.
@@ -142,7 +142,7 @@ fn cpu() -> String {
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
+pub fn finish(folder: &Path, host: &HostFacts) -> Result<(Summary, ClockSummary), String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
     write(&folder.join(HOST), &json)?;
     report(folder, Vec::new())
@@ -152,7 +152,7 @@ pub fn finish(folder: &Path, host: &HostFacts) -> Result<Summary, String> {
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn report(folder: &Path, mut notes: Vec<String>) -> Result<Summary, String> {
+pub fn report(folder: &Path, mut notes: Vec<String>) -> Result<(Summary, ClockSummary), String> {
     let recording = recording(folder)?;
     let mission = Mission::parse(MISSION, &recording.mission_toml).map_err(|faults| faults.to_string())?;
     // A flight that was ended early is measured over what was flown.

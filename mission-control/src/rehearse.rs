@@ -34,7 +34,7 @@ pub fn rehearse(mission: &Arc<Mission>, out: Option<&Path>) -> Result<(PathBuf, 
     })?;
     let wall_s = begun.elapsed().as_secs_f64();
     let host = HostFacts::now("mission-control simulate", None, wall_s, Vec::new(), outcome.aborted.clone());
-    let summary = folder::finish(&folder, &host)?;
+    let (summary, _) = folder::finish(&folder, &host)?;
     Ok((folder, outcome, summary))
 }
 
@@ -84,5 +84,6 @@ fn t_ns(row: &Row) -> i64 {
         Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
         Row::Clock(ClockRecord::Ticks(row)) => row.t_ns,
         Row::Clock(ClockRecord::Note(row)) => row.t_ns,
+        Row::Clock(ClockRecord::Overrun(row)) => row.t_ns,
     }
 }

@@ -27,7 +27,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
-use crate::results::Summary;
+use crate::results::{ClockSummary, Summary};
 
 /// How long own processes may take to come up.
 const OWN_PATIENCE: Duration = Duration::from_secs(60);
@@ -60,6 +60,8 @@ pub struct Flown {
     pub sound: bool,
     /// Its numbers; what is missing is among its warnings.
     pub summary: Summary,
+    /// What depends on the machine.
+    pub clock: ClockSummary,
 }
 
 /// Why a flight came to nothing.
@@ -182,8 +184,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         Pace::Stepped => None,
     };
     let host = HostFacts::now(&how, speed_up, begun.elapsed().as_secs_f64(), missing, aborted);
-    let summary = folder::finish(&folder, &host).map_err(Failure::Files)?;
-    Ok(Flown { folder, phase, sound, summary })
+    let (summary, clock) = folder::finish(&folder, &host).map_err(Failure::Files)?;
+    Ok(Flown { folder, phase, sound, summary, clock })
 }
 
 /// The option with which `run` flies at this pace.

@@ -76,7 +76,8 @@ pub fn simulate_with(
         mission,
         names: mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect(),
         hub,
-        nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::new(&vehicle.id)).collect(),
+        // Two hundred copies of a mission with forty thousand links would take gigabytes.
+        nodes: mission.vehicles.iter().map(|vehicle| VehicleNode::knowing(&vehicle.id, mission.clone())).collect(),
         conduct: Conduct::new(mission.clone(), Pace::Stepped, None, false),
         events: VecDeque::new(),
         now: Time::ZERO,
@@ -161,7 +162,7 @@ impl Fleet<'_> {
                     self.hub.handle(self.now, Some(HubInput::ClockStarted(ClockPlan::Stepped)));
                 }
                 // A stepped clock delivers with the grant; logs are not files here; the console is elsewhere.
-                HubOutput::Deliver(..)
+                HubOutput::Deliver { .. }
                 | HubOutput::OpenLog { .. }
                 | HubOutput::CloseLog
                 | HubOutput::Dismissed

@@ -15,7 +15,8 @@ use bus::queue::{Bell, Events};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
 use clap::Parser;
-use common::record::{ClockRecord, Name, NoteRow, Row};
+use common::record::{ClockRecord, Name, Overrun, OverrunRow, Row, Settled};
+use common::time::Time;
 use common::wire::fleet::{Pace, ToFleet};
 use common::wire::vehicle::{ClockPlan, FromVehicle, Phase};
 use common::wire::{self, Garbage, GarbageCount};
@@ -36,7 +37,7 @@ const BURST: Duration = Duration::from_millis(1);
 /// How long messages of a burst wait for others that go the same way.
 const GATHERING: Duration = Duration::from_micros(200);
 
-/// Between two notes about states that were dropped.
+/// Between two rows about states that were dropped.
 const OVERRUN_PERIOD: Duration = Duration::from_secs(1);
 
 /// The only way from one vehicle to another: carries, delays and drops coordination states as the mission says.
@@ -86,8 +87,11 @@ pub fn run(args: Args) -> ExitCode {
         lines: HashMap::new(),
         ids: BTreeMap::new(),
         seats: Vec::new(),
+        posted: Vec::new(),
         burst: Burst::default(),
-        overrun: Overrun { noted: 0, pace: AtMostEvery::new(OVERRUN_PERIOD) },
+        overruns: BTreeMap::new(),
+        overrun_pace: AtMostEvery::new(OVERRUN_PERIOD),
+        clock: Clock::Stopped,
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
@@ -125,12 +129,8 @@ fn take_shortcut(program: &Arc<Shared<HubPort>>, bell: Bell<HubEvent>) {
     program.hold().port.switchboard.set_shortcut(Box::new(take));
 }
 
-/// States that came faster than they could be decided about.
-#[derive(Clone, Copy, Debug)]
-struct Overrun {
-    noted: u64,
-    pace: AtMostEvery,
-}
+/// A delivery that is to be recorded when it is handed over, and when it was due.
+type Posted = (Settled, Option<Instant>);
 
 /// How much was sent of late.
 #[derive(Clone, Copy, Debug, Default)]
@@ -159,9 +159,14 @@ struct HubPort {
     ids: BTreeMap<LineId, Name>,
     /// The lines of vehicles, by number.
     seats: Vec<Option<LineId>>,
+    /// What waits to be handed over, by the number of the line.
+    posted: Vec<Vec<Posted>>,
     burst: Burst,
-    /// States that were dropped so far, and how many of them were noted, and when.
-    overrun: Overrun,
+    /// How many states were recorded as dropped, by line and place.
+    overruns: BTreeMap<(LineId, Overrun), u64>,
+    overrun_pace: AtMostEvery,
+    /// The program's clock.
+    clock: Clock,
     /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
@@ -171,6 +176,15 @@ struct HubPort {
     rest: Rest,
     /// Why recording failed; the flight is stopped at the next opportunity.
     recording_failed: Option<String>,
+}
+
+/// The messages of a line were handed to its session: records them, with how late that was.
+fn settle(posted: &mut [Vec<Posted>], logs: &mut Logs, line: LineId, at: Instant) {
+    for (mut settled, due) in posted.get_mut(line.index()).into_iter().flat_map(|posted| posted.drain(..)) {
+        let late = due.map_or(Duration::ZERO, |due| at.saturating_duration_since(due));
+        settled.late_ns = Some(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX));
+        logs.settled(&settled);
+    }
 }
 
 fn is_control(id: &str) -> bool {
@@ -197,7 +211,7 @@ impl HubPort {
             (burst.begun, burst.sendings) = (Some(at), 0);
         }
         if burst.sendings < SINGLE_SENDINGS {
-            burst.sendings += self.switchboard.flush();
+            self.burst.sendings += self.hand_over();
             return false;
         }
         if self.switchboard.is_flushed() {
@@ -207,20 +221,28 @@ impl HubPort {
         true
     }
 
-    /// Notes, once a second, how many states were dropped before they could be decided about.
-    fn note_overrun(&mut self, hub: &Hub) {
-        let dropped = self.switchboard.dropped();
-        if dropped > self.overrun.noted && self.overrun.pace.is_due() && hub.phase() == Phase::Running {
-            let note = NoteRow {
-                t_ns: hub.mission_time().nanos().max(0),
-                source: HUB.into(),
-                text: "states came faster than they could be taken: the oldest were dropped".into(),
-                count: dropped - self.overrun.noted,
-            };
-            self.logs.write(Row::Clock(ClockRecord::Note(note)));
-            self.overrun.noted = dropped;
-            self.overrun.pace.happened();
+    /// Sends what was posted, and records how late it was at that moment; how many messages.
+    fn hand_over(&mut self) -> usize {
+        let (posted, logs) = (&mut self.posted, &mut self.logs);
+        self.switchboard.flush(|line, at| settle(posted, logs, line, at))
+    }
+
+    /// Records how many states were dropped for want of time or room since it was last done, by line and place.
+    fn record_overruns(&mut self, record: bool) {
+        let t_ns = self.clock.now().nanos().max(0);
+        for line in self.seats.iter().flatten() {
+            let (Some(counts), Some(vehicle)) = (self.switchboard.counts(*line), self.ids.get(line)) else { continue };
+            for (place, so_far) in
+                [(Overrun::BeforeEmulator, counts.state_dropped), (Overrun::ToReceiver, counts.state_unsent)]
+            {
+                let before = self.overruns.insert((*line, place), so_far).unwrap_or(0);
+                if record && so_far > before {
+                    let row = OverrunRow { t_ns, vehicle: vehicle.clone(), place, count: so_far - before };
+                    self.logs.write(Row::Clock(ClockRecord::Overrun(row)));
+                }
+            }
         }
+        self.overrun_pace.happened();
     }
 
     fn ignore(&mut self, line: LineId, kind: Garbage) {
@@ -289,17 +311,31 @@ impl Port for HubPort {
     fn perform(&mut self, output: HubOutput, clock: &mut Clock) -> Next<Self> {
         match output {
             HubOutput::ToVehicle(id, message) => self.send(&id, &wire::encode(&message)),
-            HubOutput::Deliver(seat, bytes) => {
-                if let Some(Some(line)) = self.seats.get(seat) {
-                    self.switchboard.post(*line, &bytes);
+            HubOutput::Deliver { seat, bytes, settled } => match self.seats.get(seat) {
+                Some(Some(line)) => {
+                    if let Some(settled) = settled {
+                        self.posted.resize_with(self.posted.len().max(line.index() + 1), Vec::new);
+                        let due = clock.instant_of(Time::from_nanos(settled.due_ns));
+                        self.posted[line.index()].push((settled, due));
+                    }
+                    if let Some(at) = self.switchboard.post(*line, &bytes) {
+                        settle(&mut self.posted, &mut self.logs, *line, at);
+                    }
                 }
-            }
+                _ => settled.iter().for_each(|settled| self.logs.settled(settled)),
+            },
             HubOutput::ToControl { who, message } => self.send(&who, &wire::encode(&message)),
             HubOutput::Record(row) => self.logs.write(row),
             HubOutput::Settled(settled) => self.logs.settled(&settled),
-            HubOutput::CloseLog => self.logs.close(),
+            HubOutput::CloseLog => {
+                self.hand_over();
+                self.record_overruns(true);
+                self.logs.close();
+            }
             HubOutput::Say(text) => tracing::info!("{text}"),
             HubOutput::OpenLog { mission, fresh } => {
+                // What was dropped before is not of this flight.
+                self.record_overruns(false);
                 return Next::Feed(match self.logs.open(&mission.0, fresh) {
                     Ok(earlier) => HubInput::LogOpened { last: earlier.until },
                     Err(reason) => {
@@ -315,10 +351,12 @@ impl Port for HubPort {
                     Pace::Real { speed_up } => Clock::plan(START_LEAD, speed_up),
                 };
                 *clock = Clock::follow(plan);
+                self.clock = *clock;
                 return Next::Feed(HubInput::ClockStarted(plan));
             }
             HubOutput::FollowClock(plan) => {
                 *clock = Clock::follow(plan);
+                self.clock = *clock;
                 return Next::Feed(HubInput::ClockStarted(plan));
             }
             HubOutput::ReadLog { digest, file, offset } => {
@@ -335,7 +373,7 @@ impl Port for HubPort {
             Some(at) if at > now => {}
             Some(_) => {
                 // It goes on while there is much to send.
-                let goes_on = self.switchboard.flush() >= SINGLE_SENDINGS / 2;
+                let goes_on = self.hand_over() >= SINGLE_SENDINGS / 2;
                 self.burst = Burst { begun: Some(now), sendings: 0, send_at: goes_on.then_some(now + GATHERING) };
             }
             None => {
@@ -346,7 +384,9 @@ impl Port for HubPort {
     }
 
     fn tend(&mut self, hub: &Hub) -> Next<Self> {
-        self.note_overrun(hub);
+        if self.overrun_pace.is_due() && hub.phase() == Phase::Running {
+            self.record_overruns(true);
+        }
         if let Some(failure) = self.logs.tend() {
             tracing::error!("{failure}; the network goes on without it");
             self.recording_failed = Some(failure);

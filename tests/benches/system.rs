@@ -1,7 +1,7 @@
 //! The system as a whole, measured. Build the programs first:
 //!
 //! ```text
-//! cargo build --release && cargo bench -p cpf-tests --bench system -- [machines] [simulate] [stepped] [hop] [throughput] [delay] [fleet]
+//! cargo build --release && cargo bench -p cpf-tests --bench system -- [machines] [simulate] [stepped] [hop] [throughput] [delay] [fleet] [crowd] [flight] [medium]
 //! ```
 //!
 //! Without a name, all are run, in two minutes or so. Rows are for docs/benchmarks.md. Medians count; on a shared machine the tails say more about
@@ -18,15 +18,17 @@ use bus::Plane;
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::queue::Events;
 use bus::setup::Endpoint;
+use common::machine::Machine;
 use common::mission::Mission;
-use common::record::ClockRecord;
-use common::time::Time;
+use common::record::{ClockRecord, Fate, Overrun, Record, Row};
+use common::time::{Span, Time};
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::state::CoordinationState;
 use common::wire::vehicle::{FromVehicle, Phase, ToVehicle};
 use cpf_tests::{Ground, mission, mission_text, program};
 use mission_control::sweep::plan::Plan as SweepPlan;
 use mission_control::sweep::setting::Setting;
+use network_emulator::emulator::{Channel, Emulator, Sent};
 use zenoh::Wait;
 
 fn main() {
@@ -45,6 +47,9 @@ fn main() {
         ("throughput", throughput),
         ("delay", delay),
         ("fleet", fleet),
+        ("crowd", crowd),
+        ("flight", in_flight),
+        ("medium", medium),
     ] {
         if wanted(name) {
             bench();
@@ -277,43 +282,10 @@ impl Emulated {
             abreast(2, 100_000.0, network, 0.5).replace("[\"v0\", \"v1\"], [\"v1\", \"v0\"], ", "[\"v0\", \"v1\"]");
         let mission = mission(&text);
         let folder = ground.path("logs");
-        let mut emulator = Command::new(program("network-emulator"))
-            .args(["--listen", "tcp/127.0.0.1:0", "--logs"])
-            .arg(&folder)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("starts");
-        let mut line = String::new();
-        std::io::BufRead::read_line(&mut std::io::BufReader::new(emulator.stdout.take().expect("piped")), &mut line)
-            .expect("says where");
-        let endpoint: Endpoint = line.trim().parse().expect("an endpoint");
-        let join = |id: &str| Line::connect(LineConfig::new(endpoint.clone(), id)).expect("joins");
-        let ((sender, from_0), (receiver, from_1), (control, from_hub)) =
-            (join("v0"), join("v1"), join("mission-control"));
-        for line in [&sender, &receiver] {
-            say(line, &FromVehicle::Hello { phase: Phase::Idle, flight: None });
-        }
-        control.send(Plane::Mission, &common::wire::encode(&ToFleet::Upload { mission: text })).expect("sent");
-        for (line, events) in [(&sender, &from_0), (&receiver, &from_1)] {
-            wait_for(events, |m: ToVehicle| matches!(m, ToVehicle::Arm { .. }));
-            say(line, &FromVehicle::Armed { digest: mission.digest });
-        }
-        loop {
-            let start = ToFleet::Start { pace: Pace::Real { speed_up: 1.0 } };
-            control.send(Plane::Mission, &common::wire::encode(&start)).expect("sent");
-            control.send(Plane::Mission, &common::wire::encode(&ToFleet::Status)).expect("sent");
-            let mut running = false;
-            wait_for(&from_hub, |m: FromFleet| {
-                if let FromFleet::Status(status) = &m {
-                    running = status.phase == Phase::Running && status.now > Time::ZERO;
-                }
-                matches!(m, FromFleet::Status(_))
-            });
-            if running {
-                break;
-            }
-        }
+        let (emulator, endpoint) = emulator(&folder);
+        let (mut lines, control) = under_way(&text, &mission, &endpoint);
+        let (receiver, from_1) = lines.pop().expect("v1");
+        let (sender, from_0) = lines.pop().expect("v0");
         std::thread::spawn(move || {
             for event in from_1 {
                 if let LineEvent::Packet { plane: Plane::State, at, bytes } = event {
@@ -337,9 +309,7 @@ impl Emulated {
     fn send(&self) -> u32 {
         let seq = self.seq.get();
         self.seq.set(seq + 1);
-        let state =
-            CoordinationState { mission: self.mission.digest, sender: 0, seq, made: Time::ZERO, xi: 1.0, scalar: None };
-        let _ = self.sender.send(Plane::State, &state.encode());
+        let _ = self.sender.send(Plane::State, &word(&self.mission, 0, seq));
         seq
     }
 }
@@ -348,6 +318,49 @@ impl Drop for Emulated {
     fn drop(&mut self) {
         let _ = self.emulator.kill();
         let _ = self.emulator.wait();
+    }
+}
+
+/// An emulator in a process of its own.
+fn emulator(logs: &Path) -> (Child, Endpoint) {
+    let mut emulator = Command::new(program("network-emulator"))
+        .args(["--listen", "tcp/127.0.0.1:0", "--logs"])
+        .arg(logs)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("starts");
+    let mut line = String::new();
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(emulator.stdout.take().expect("piped")), &mut line)
+        .expect("says where");
+    (emulator, line.trim().parse().expect("an endpoint"))
+}
+
+/// The lines of all vehicles of a mission, played by this process, and mission-control's, with the flight under way.
+fn under_way(text: &str, mission: &Mission, endpoint: &Endpoint) -> (Vec<(Line, Events<LineEvent>)>, Line) {
+    let join = |id: &str| Line::connect(LineConfig::new(endpoint.clone(), id)).expect("joins");
+    let lines: Vec<(Line, Events<LineEvent>)> = mission.vehicles.iter().map(|vehicle| join(&vehicle.id)).collect();
+    let (control, from_hub) = join("mission-control");
+    lines.iter().for_each(|(line, _)| say(line, &FromVehicle::Hello { phase: Phase::Idle, flight: None }));
+    control.send(Plane::Mission, &common::wire::encode(&ToFleet::Upload { mission: text.to_string() })).expect("sent");
+    for (line, events) in &lines {
+        wait_for(events, |m: ToVehicle| matches!(m, ToVehicle::Arm { .. }));
+        say(line, &FromVehicle::Armed { digest: mission.digest });
+    }
+    loop {
+        let start = ToFleet::Start { pace: Pace::Real { speed_up: 1.0 } };
+        control.send(Plane::Mission, &common::wire::encode(&start)).expect("sent");
+        control.send(Plane::Mission, &common::wire::encode(&ToFleet::Status)).expect("sent");
+        let mut running = false;
+        wait_for(&from_hub, |m: FromFleet| {
+            if let FromFleet::Status(status) = &m {
+                running = status.phase == Phase::Running && status.now > Time::ZERO;
+            }
+            matches!(m, FromFleet::Status(_))
+        });
+        if running {
+            return (lines, control);
+        }
     }
 }
 
@@ -364,6 +377,11 @@ fn wait_for<M: bincode::Decode<()>>(events: &Events<LineEvent>, mut is_it: impl 
             return;
         }
     }
+}
+
+/// A coordination state of this vehicle.
+fn word(mission: &Mission, sender: u16, seq: u32) -> Vec<u8> {
+    CoordinationState { mission: mission.digest, sender, seq, made: Time::ZERO, xi: 1.0, scalar: None }.encode()
 }
 
 /// One-way latency at 1000 messages per second, alternating between the plain router and the emulator.
@@ -439,8 +457,19 @@ fn throughput() {
 
 /// Achieved minus commanded delay, as the emulator records it for every message.
 fn delay() {
-    for (name, seconds) in [("5 ms", 0.005), ("100 ms", 0.1), ("1 s", 1.0)] {
-        let network = format!("delay = {{ constant = {{ delay_s = {seconds:?} }} }}");
+    let constant = |name: &str, seconds: f64| {
+        (name.to_string(), seconds, format!("delay = {{ constant = {{ delay_s = {seconds:?} }} }}"))
+    };
+    let everything = "delay = { jittered = { min_s = 0.005, max_s = 0.02 } }\n\
+        loss = { gilbert_elliott = { mean_burst = 3.0, mean_gap = 57.0 } }\n\
+        range = { curve = { points = [[0.0, 1.0], [100.0, 0.5]] } }\n\
+        duplicate_probability = 0.02\ncorrupt_probability = 0.02\norder = \"in_order\"\n\
+        medium = { rate_bps = 1e8, packet_bytes = 64, queue = 100, backoff_s = 0.0001, half_duplex = true, collisions = true }\n\
+        switching = { markov = { mean_up_s = 0.5, mean_down_s = 0.05 } }";
+    let every_model = ("5 to 20 ms, every model switched on".to_string(), 0.02, everything.to_string());
+    for (name, seconds, network) in
+        [constant("5 ms", 0.005), constant("100 ms", 0.1), constant("1 s", 1.0), every_model]
+    {
         let emulated = Emulated::new(&network, |_, _| {});
         let begun = Instant::now();
         for i in 0..3000u32 {
@@ -520,4 +549,156 @@ fn fleet_memory(parent: u32) -> String {
         return "not measured".to_string();
     }
     format!("{:.1} / {:.1} MB ({} processes)", median(rss.clone()), median(pss), rss.len())
+}
+
+// --- crowds --------------------------------------------------------------------------------------------------------------
+
+/// The emulator at what it cannot do: two hundred vehicles that all hear one another at 10 Hz.
+fn crowd() {
+    const N: usize = 200;
+    const ROUNDS: u32 = 100;
+    let ground = Ground::new();
+    let mut links = String::new();
+    for i in 0..N {
+        (i + 1..N).for_each(|j| links += &format!("[\"v{i}\", \"v{j}\"], "));
+    }
+    let text = abreast(N, 100_000.0, "", 0.5);
+    let (begin, end) = (text.find("links = [").expect("links"), text.find("]\n\n[fleet]").expect("the end of them"));
+    let text = format!("{}links = [{links}{}", &text[..begin], &text[end..]);
+    let mission = mission(&text);
+    let folder = ground.path("logs");
+    let (mut emulator, endpoint) = emulator(&folder);
+    let (lines, control) = under_way(&text, &mission, &endpoint);
+    let heard = Arc::new(AtomicU64::new(0));
+    let mut vehicles = Vec::new();
+    for (line, events) in lines {
+        let heard = heard.clone();
+        let listens = move || {
+            let states = events.filter(|event| matches!(event, LineEvent::Packet { plane: Plane::State, .. }));
+            states.for_each(|_| _ = heard.fetch_add(1, Ordering::Relaxed));
+        };
+        std::thread::spawn(listens);
+        vehicles.push(line);
+    }
+    let begun = Instant::now();
+    for seq in 0..ROUNDS {
+        std::thread::sleep((begun + Duration::from_millis(100) * seq).saturating_duration_since(Instant::now()));
+        for (sender, line) in (0..).zip(&vehicles) {
+            let _ = line.send(Plane::State, &word(&mission, sender, seq));
+        }
+    }
+    // What still waits is let out, and nothing more comes.
+    let mut last = u64::MAX;
+    while last != heard.load(Ordering::Relaxed) {
+        last = heard.load(Ordering::Relaxed);
+        std::thread::sleep(Duration::from_secs(1));
+    }
+    let seconds = begun.elapsed().as_secs_f64();
+    let memory = std::fs::read_to_string(format!("/proc/{}/status", emulator.id())).expect("it lives");
+    let memory = |name: &str| {
+        let line = memory.lines().find(|line| line.starts_with(name)).expect("a known field");
+        line.split_whitespace().nth(1).and_then(|kb| kb.parse::<f64>().ok()).expect("a number") / 1024.0
+    };
+    let (now, most) = (memory("VmRSS:"), memory("VmHWM:"));
+    let (unsent, own): (u64, u64) = vehicles
+        .iter()
+        .map(|line| line.counts())
+        .fold((0, 0), |(unsent, own), counts| (unsent + counts.state_unsent, own + counts.state_dropped));
+    control.send(Plane::Mission, &common::wire::encode(&ToFleet::Stop)).expect("sent");
+    std::thread::sleep(Duration::from_secs(3));
+    let log = folder.join(format!("{:016x}", mission.digest)).join("network-emulator.mcap");
+    let (mut delivered, mut before, mut behind) = (0u64, 0, 0);
+    for row in bus::recording::RowReader::open(log).expect("a recording") {
+        match row.expect("readable") {
+            Row::Exact(Record::Message(row)) => delivered += u64::from(row.fate == Fate::Delivered),
+            Row::Clock(ClockRecord::Overrun(row)) if row.place == Overrun::BeforeEmulator => before += row.count,
+            Row::Clock(ClockRecord::Overrun(row)) => behind += row.count,
+            _ => {}
+        }
+    }
+    let _ = emulator.kill();
+    let _ = emulator.wait();
+    let asked = N as u64 * (N as u64 - 1) * u64::from(ROUNDS);
+    row(
+        &format!(
+            "{N} vehicles that all hear one another, 10 Hz for {} s: deliveries asked, booked, received",
+            ROUNDS / 10
+        ),
+        &format!("{asked}, {delivered}, {} within {seconds:.0} s", heard.load(Ordering::Relaxed)),
+    );
+    row(
+        "dropped for want of time: words at the vehicle, words before the emulator, on the way to receivers, in their queues",
+        &format!("{unsent}, {before}, {behind}, {own}"),
+    );
+    row("memory of the emulator there, at the end / at most", &format!("{now:.0} / {most:.0} MB"));
+}
+
+/// Resident memory of this process \[bytes\].
+fn resident() -> f64 {
+    let statm = std::fs::read_to_string("/proc/self/statm").expect("Linux");
+    statm.split_whitespace().nth(1).and_then(|pages| pages.parse::<f64>().ok()).expect("pages") * 4096.0
+}
+
+/// What a message under way costs, in time and memory, by how many are.
+fn in_flight() {
+    for n in [10_000u32, 100_000, 1_000_000] {
+        let network = "queue = 1000000\ndelay = { jittered = { min_s = 2000.0, max_s = 3000.0 } }";
+        let mission = mission(&abreast(2, 100_000.0, network, 0.5));
+        let mut emulator = Emulator::new(mission.clone(), None);
+        while emulator.poll_output().is_some() {}
+        let words: Vec<Arc<[u8]>> = (0..n).map(|seq| word(&mission, 0, seq).into()).collect();
+        let (memory, begun) = (resident(), cpu_seconds());
+        for (seq, bytes) in (0..).zip(words) {
+            emulator.handle(Time::from_nanos(seq * 1_000_000), Some(Sent { from: 0, bytes }));
+        }
+        let (memory, taken) = (resident() - memory, cpu_seconds());
+        emulator.handle(Time::from_secs(9_000.0), None);
+        let mut settled = 0u32;
+        while let Some(output) = emulator.poll_output() {
+            settled += u32::from(matches!(output, Channel::Settled(_)));
+        }
+        let n = f64::from(n);
+        assert_eq!(f64::from(settled), n);
+        row(
+            &format!("{n:.0} messages under way: taking one, delivering one, memory of one beside its bytes"),
+            &format!(
+                "{:.0} ns, {:.0} ns, {:.0} bytes",
+                (taken - begun) / n * 1e9,
+                (cpu_seconds() - taken) / n * 1e9,
+                memory / n
+            ),
+        );
+    }
+}
+
+/// What a message costs on a shared medium where all hear all, by how many vehicles there are.
+fn medium() {
+    for n in [16usize, 32, 64, 128] {
+        let mut links = String::new();
+        for i in 0..n {
+            (i + 1..n).for_each(|j| links += &format!("[\"v{i}\", \"v{j}\"], "));
+        }
+        let network = "medium = { rate_bps = 1e5, backoff_s = 0.09, half_duplex = true, collisions = true }\n\
+                       delay = { distance = { speed_mps = 1500.0 } }";
+        let text = abreast(n, 100_000.0, network, 0.5);
+        let (begin, end) = (text.find("links = [").expect("links"), text.find("]\nmedium").expect("the end of them"));
+        let mission = mission(&format!("{}links = [{links}{}", &text[..begin], &text[end..]));
+        let mut emulator = Emulator::new(mission.clone(), None);
+        let rounds = 200_000 / (n * n) as u32 + 2;
+        let begun = cpu_seconds();
+        for seq in 0..rounds {
+            let at = Time::from_nanos(i64::from(seq) * 100_000_000);
+            for sender in 0..n {
+                let bytes = word(&mission, sender as u16, seq).into();
+                emulator.handle(at, Some(Sent { from: sender, bytes }));
+            }
+            emulator.handle(at + Span::from_secs(0.099), None);
+            while emulator.poll_output().is_some() {}
+        }
+        let messages = f64::from(rounds) * (n * (n - 1)) as f64;
+        row(
+            &format!("a message on one link of a shared medium, {n} vehicles that all hear one another"),
+            &format!("{:.0} ns", (cpu_seconds() - begun) / messages * 1e9),
+        );
+    }
 }

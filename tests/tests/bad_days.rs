@@ -122,6 +122,16 @@ fn a_vehicle_that_is_killed_rejoins_where_the_others_are() {
     // Back at the others' place soon: at v_L the fleet went further than this in the gap.
     let apart = fleet.apart_at_last("run", "b");
     assert!(apart.abs() < 0.5, "{apart}");
+    // While it was away, what was sent to it was dropped as such, and its links count as down.
+    let summary = fleet.ground.json("run/summary.json");
+    let links = summary["links"].as_array().expect("links");
+    for (from, to) in [("a", "b"), ("b", "a")] {
+        let link = links.iter().find(|link| link["from"] == from && link["to"] == to).expect("a link");
+        let absent = link["receiver_absent"].as_u64().expect("a count");
+        assert!(if to == "b" { absent > 10 } else { absent == 0 }, "{link}");
+        assert!(link["longest_outage_s"].as_f64() > Some(5.0) && link["balanced"] == true, "{link}");
+    }
+    assert!(summary["fleet"]["connectivity"]["alpha"].as_f64() > Some(0.0), "{summary}");
     let notes = fleet.notes("run");
     assert!(notes.contains("lost the line to b") && notes.contains("b joins the flight under way"), "{notes}");
 }

@@ -67,7 +67,7 @@ fn drain(
     let name = |vehicle: usize| Name::from(mission.vehicles[vehicle].id.as_str());
     while let Some(output) = emulator.poll_output() {
         match output {
-            Channel::Deliver { to, due, bytes } => inboxes.entry(to).or_default().push((due, bytes.to_vec())),
+            Channel::Deliver { to, due, bytes, .. } => inboxes.entry(to).or_default().push((due, bytes.to_vec())),
             Channel::Record(Row::Exact(record)) => records.push(record),
             Channel::Record(_) => {}
             Channel::Settled(settled) => {

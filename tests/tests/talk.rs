@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use bus::recording::Recording;
 use common::mission::Mission;
-use common::record::Row;
+use common::record::{Record, Row};
 use cpf_tests::{assert_close, mission, mission_text, with};
 use mission_control::facts::facts;
-use mission_control::results::{Summary, summarise};
+use mission_control::results::{Summary, network_section, summarise};
 use mission_control::simulate::simulate;
 
 fn fly(text: &str) -> Summary {
@@ -113,4 +113,38 @@ fn neighbours_may_be_taken_to_move_as_they_last_did() {
     let text = with(&text, "threshold = 0.05", "threshold = 0.05\npatience_s = 1.0");
     let estimate = fly(&with(&text, "between = \"advance\"", "between = \"estimate\""));
     assert!(apart(&estimate) < 0.2, "{}", apart(&estimate));
+}
+
+/// A message: from, to, its number, and its fate.
+type Message = (String, String, u64, String);
+
+/// What became of every message, and all rows.
+fn fates(text: &str) -> (Vec<Message>, Vec<Record>) {
+    let mut exact = Vec::new();
+    let keep = |row| {
+        if let Row::Exact(record) = row {
+            exact.push(record);
+        }
+    };
+    simulate(&mission(text), keep, |_| true).expect("the mission can be flown");
+    let of = |record: &Record| match record {
+        Record::Message(row) => {
+            Some((row.from.to_string(), row.to.to_string(), row.seq, row.fate.as_str().to_string()))
+        }
+        _ => None,
+    };
+    (exact.iter().filter_map(of).collect(), exact)
+}
+
+#[test]
+fn the_losses_of_a_recorded_run_happen_again_message_by_message() {
+    let text = mission_text("missions/talk/event-triggered.toml");
+    let (flown, exact) = fates(&text);
+    assert!(flown.iter().filter(|(.., fate)| fate == "lost").count() > 100, "two in three are lost");
+    let section = network_section(&exact, mission(&text).message_period());
+    let pasted = with(&text, "loss = { bernoulli = { probability = 0.667 } }\n", &format!("{section}\n"));
+    let (again, _) = fates(&pasted);
+    assert_eq!(flown.len(), again.len());
+    let parted = flown.iter().zip(&again).find(|(one, other)| one != other);
+    assert_eq!(parted, None, "the first message with another fate");
 }

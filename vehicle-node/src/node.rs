@@ -90,6 +90,8 @@ impl PartialEq for Opened {
 /// A vehicle process as a pure machine.
 pub struct VehicleNode {
     id: String,
+    /// A mission that was checked already.
+    checked: Option<Arc<Mission>>,
     phase: Phase,
     load: Option<Load>,
     outputs: VecDeque<NodeOutput>,
@@ -106,7 +108,12 @@ struct Load {
 impl VehicleNode {
     /// A vehicle called `id` that knows nothing yet.
     pub fn new(id: &str) -> VehicleNode {
-        VehicleNode { id: id.to_string(), phase: Phase::Idle, load: None, outputs: VecDeque::new() }
+        VehicleNode { id: id.to_string(), checked: None, phase: Phase::Idle, load: None, outputs: VecDeque::new() }
+    }
+
+    /// A vehicle that need not check this mission again: a fleet in one thread shares it.
+    pub fn knowing(id: &str, mission: Arc<Mission>) -> VehicleNode {
+        VehicleNode { checked: Some(mission), ..VehicleNode::new(id) }
     }
 
     /// Where it is in its life.
@@ -172,7 +179,10 @@ impl VehicleNode {
 
     /// Checks for itself that the mission can be flown: what was uploaded need not have been checked by anyone.
     fn accept(&self, text: &str) -> Result<Load, String> {
-        let mission = Arc::new(Mission::parse("the mission", text).map_err(|faults| faults.to_string())?);
+        let mission = match &self.checked {
+            Some(checked) if checked.text == text => checked.clone(),
+            _ => Arc::new(Mission::parse("the mission", text).map_err(|faults| faults.to_string())?),
+        };
         let me = mission.index_of(&self.id).ok_or_else(|| {
             let ids: Vec<&str> = mission.vehicles.iter().map(|v| v.id.as_str()).collect();
             format!("mission {} is for {}, not for {}", mission.name, ids.join(", "), self.id)

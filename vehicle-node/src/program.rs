@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use bus::clock::AtMostEvery;
 use bus::console::{Parent, StopFlag};
 use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
@@ -11,10 +12,14 @@ use bus::logs::Logs;
 use bus::setup::Endpoint;
 use bus::{Plane, Refusal};
 use clap::Parser;
+use common::record::{ClockRecord, Name, Overrun, OverrunRow, Row};
 use common::wire::vehicle::{Phase, ToVehicle};
 use common::wire::{self, GarbageCount};
 
 use crate::node::{NodeInput, NodeOutput, VehicleNode};
+
+/// Between two rows about messages that were dropped.
+const OVERRUN_PERIOD: Duration = Duration::from_secs(1);
 
 /// One vehicle of a fleet: simulates its body, follows its path, and coordinates with the others by sending nothing but
 /// its coordination state.
@@ -85,6 +90,9 @@ pub fn run(args: Args) -> ExitCode {
         parent: args.end_with_stdin.then(Parent::at_stdin),
         rest: Rest::default(),
         garbage: GarbageCount::default(),
+        overruns: [0; 2],
+        overrun_pace: AtMostEvery::new(OVERRUN_PERIOD),
+        clock: Clock::Stopped,
         refused: None,
         recording_failed: false,
     };
@@ -106,6 +114,11 @@ struct VehiclePort {
     parent: Option<Parent>,
     rest: Rest,
     garbage: GarbageCount,
+    /// How many messages were recorded as dropped: before this program looked at them, and on their way out.
+    overruns: [u64; 2],
+    overrun_pace: AtMostEvery,
+    /// The program's clock.
+    clock: Clock,
     refused: Option<Refusal>,
     recording_failed: bool,
 }
@@ -120,6 +133,23 @@ impl VehiclePort {
         if let Err(error) = self.line.send(plane, bytes) {
             tracing::debug!("{}: not sent: {error}", self.id);
         }
+    }
+}
+
+impl VehiclePort {
+    /// Records how many messages were dropped for want of time or room since it was last done.
+    fn record_overruns(&mut self, record: bool) {
+        let counts = self.line.counts();
+        let t_ns = self.clock.now().nanos().max(0);
+        let places = [(Overrun::AtReceiver, counts.state_dropped), (Overrun::AtSender, counts.state_unsent)];
+        for ((place, so_far), before) in places.into_iter().zip(&mut self.overruns) {
+            let count = so_far - std::mem::replace(before, so_far).min(so_far);
+            if record && count > 0 {
+                let vehicle = Name::from(self.id.as_str());
+                self.logs.write(Row::Clock(ClockRecord::Overrun(OverrunRow { t_ns, vehicle, place, count })));
+            }
+        }
+        self.overrun_pace.happened();
     }
 }
 
@@ -160,13 +190,19 @@ impl Port for VehiclePort {
             NodeOutput::Send(message) => self.send(Plane::Mission, &wire::encode(&message)),
             NodeOutput::Transmit(bytes) => self.send(Plane::State, &bytes),
             NodeOutput::Record(row) => self.logs.write(row),
-            NodeOutput::CloseLog => self.logs.close(),
+            NodeOutput::CloseLog => {
+                self.record_overruns(true);
+                self.logs.close();
+            }
             NodeOutput::Say(text) => tracing::info!("{}: {text}", self.id),
             NodeOutput::FollowClock(plan) => {
                 *clock = Clock::follow(plan);
+                self.clock = *clock;
                 return Next::Feed(NodeInput::ClockStarted);
             }
             NodeOutput::OpenLog { mission, fresh } => {
+                // What was dropped before is not of this flight.
+                self.record_overruns(false);
                 return Next::Feed(match self.logs.open(&mission.0, fresh) {
                     Ok(earlier) => NodeInput::LogOpened { last: earlier.last_state.map(Box::new) },
                     Err(reason) => {
@@ -191,6 +227,9 @@ impl Port for VehiclePort {
             let on = if node.phase() == Phase::Running { "; the flight goes on without it" } else { "" };
             tracing::error!("{}: {failure}{on}", self.id);
             self.recording_failed = true;
+        }
+        if self.overrun_pace.is_due() && node.phase() == Phase::Running {
+            self.record_overruns(true);
         }
         if let Some(refusal) = self.refused.take() {
             tracing::error!("{}: {refusal}", self.id);

@@ -10,6 +10,7 @@
 //! | `/clock/achieved` | [`AchievedRow`](common::record::AchievedRow) | no |
 //! | `/clock/ticks` | [`TicksRow`](common::record::TicksRow) | no |
 //! | `/clock/notes` | [`NoteRow`](common::record::NoteRow) | no |
+//! | `/clock/overruns` | [`OverrunRow`](common::record::OverrunRow) | no |
 //!
 //! Messages are JSON with a JSON schema, in lz4 chunks. `log_time` and `publish_time` are mission time in nanoseconds;
 //! what happened before the start (negative mission time) has `log_time` 0, and its row keeps the true `t_ns`.

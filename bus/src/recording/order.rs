@@ -27,6 +27,7 @@ fn key(row: &Row) -> Key<'_> {
         Row::Clock(ClockRecord::Achieved(row)) => (&row.from, &row.to, row.seq),
         Row::Clock(ClockRecord::Ticks(row)) => (&row.vehicle, "", 0),
         Row::Clock(ClockRecord::Note(row)) => (&row.source, &row.text, 0),
+        Row::Clock(ClockRecord::Overrun(row)) => (&row.vehicle, "", row.place as u64),
     };
     (time_of(row), Topic::of(row), first, second, number)
 }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use common::record::{
-    AchievedRow, ClockRecord, MessageRow, NoteRow, Record, Row, SpeedRow, StateRow, TicksRow, TopologyRow,
+    AchievedRow, ClockRecord, MessageRow, NoteRow, OverrunRow, Record, Row, SpeedRow, StateRow, TicksRow, TopologyRow,
 };
 use schemars::generate::SchemaSettings;
 
@@ -19,13 +19,14 @@ pub(super) enum Topic {
     Achieved,
     Ticks,
     Note,
+    Overrun,
 }
 
 const STATE_PREFIX: &str = "/vehicles/";
 const STATE_SUFFIX: &str = "/state";
 
 impl Topic {
-    pub(super) const COUNT: usize = 8;
+    pub(super) const COUNT: usize = 9;
 
     pub(super) fn of(row: &Row) -> Topic {
         match row {
@@ -37,6 +38,7 @@ impl Topic {
             Row::Clock(ClockRecord::Achieved(_)) => Topic::Achieved,
             Row::Clock(ClockRecord::Ticks(_)) => Topic::Ticks,
             Row::Clock(ClockRecord::Note(_)) => Topic::Note,
+            Row::Clock(ClockRecord::Overrun(_)) => Topic::Overrun,
         }
     }
 
@@ -51,6 +53,7 @@ impl Topic {
             Topic::Achieved => "/clock/achieved".into(),
             Topic::Ticks => "/clock/ticks".into(),
             Topic::Note => "/clock/notes".into(),
+            Topic::Overrun => "/clock/overruns".into(),
         }
     }
 
@@ -64,6 +67,7 @@ impl Topic {
             "/clock/achieved" => Some(Topic::Achieved),
             "/clock/ticks" => Some(Topic::Ticks),
             "/clock/notes" => Some(Topic::Note),
+            "/clock/overruns" => Some(Topic::Overrun),
             _ => name.strip_prefix(STATE_PREFIX)?.strip_suffix(STATE_SUFFIX).map(|_| Topic::State),
         }
     }
@@ -79,6 +83,7 @@ impl Topic {
             Topic::Message => ("cpf.Message", generator.into_root_schema_for::<MessageRow>()),
             Topic::Achieved => ("cpf.Achieved", generator.into_root_schema_for::<AchievedRow>()),
             Topic::Ticks => ("cpf.Ticks", generator.into_root_schema_for::<TicksRow>()),
+            Topic::Overrun => ("cpf.Overrun", generator.into_root_schema_for::<OverrunRow>()),
             Topic::Warning | Topic::Note => ("cpf.Note", generator.into_root_schema_for::<NoteRow>()),
         };
         (name, schema.as_value().to_string().into_bytes())
@@ -95,6 +100,7 @@ impl Topic {
             Topic::Achieved => Row::Clock(ClockRecord::Achieved(serde_json::from_slice(json)?)),
             Topic::Ticks => Row::Clock(ClockRecord::Ticks(serde_json::from_slice(json)?)),
             Topic::Note => Row::Clock(ClockRecord::Note(serde_json::from_slice(json)?)),
+            Topic::Overrun => Row::Clock(ClockRecord::Overrun(serde_json::from_slice(json)?)),
         })
     }
 
@@ -118,6 +124,7 @@ impl Topic {
             }
             Row::Clock(ClockRecord::Ticks(row)) => serde_json::to_writer(json, row),
             Row::Clock(ClockRecord::Note(row)) => serde_json::to_writer(json, row),
+            Row::Clock(ClockRecord::Overrun(row)) => serde_json::to_writer(json, row),
         }
     }
 }
@@ -138,6 +145,7 @@ pub(crate) fn time_of(row: &Row) -> i64 {
         Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
         Row::Clock(ClockRecord::Ticks(row)) => row.t_ns,
         Row::Clock(ClockRecord::Note(row)) => row.t_ns,
+        Row::Clock(ClockRecord::Overrun(row)) => row.t_ns,
     }
 }
 

@@ -120,6 +120,45 @@ fn a_program_that_does_not_listen_loses_the_oldest_messages_and_is_told_how_many
 }
 
 #[test]
+fn a_participant_that_takes_nothing_costs_the_oldest_states_with_a_count_and_gets_the_newest_when_it_does() {
+    const COUNT: u32 = 40_000;
+    let (hub, hub_events) = hub();
+    let lobby = plain_client(hub.endpoint().port());
+    let client = plain_client(ask_for_line(&lobby, "idler", 7).expect("let in"));
+    let (heard, hears) = mpsc::channel();
+    hear_everything(&client, heard);
+    let put = |bytes: Vec<u8>| {
+        let congestion = zenoh::qos::CongestionControl::Block;
+        client.put("cpf/idler/up/mission", bytes).congestion_control(congestion).wait().expect("open");
+    };
+    put(hello(7));
+    let number = expect_joined(&hub_events, "idler");
+    // It never says that anything has arrived, as one that is frozen.
+    (0..COUNT).for_each(|i| hub.send(number, Plane::State, &i.to_le_bytes()).expect("joined"));
+    let counts = hub.counts(number).expect("known");
+    let waiting = u64::from(COUNT) - counts.state_out - counts.state_unsent;
+    assert!(counts.state_unsent > u64::from(COUNT) / 2, "{counts:?}");
+    // 70 bytes with a header are on their way for each, and 6 wait.
+    assert!(counts.state_out * 70 <= 512 << 10 && waiting * 6 <= 64 << 10, "{counts:?}, {waiting} wait");
+
+    // Once it has taken all, what waits goes out: the newest, in order.
+    let mut taken = vec![0x14];
+    taken.extend((counts.state_out * 70).to_le_bytes());
+    put(taken);
+    let mut states = hears.iter().filter(|(key, _)| key.ends_with("/state")).map(|(_, bytes)| {
+        let number: [u8; 4] = bytes[2..].try_into().expect("one message, alone");
+        u64::from(u32::from_le_bytes(number))
+    });
+    for expected in (0..counts.state_out).chain(counts.state_out + counts.state_unsent..u64::from(COUNT)) {
+        assert_eq!(states.next(), Some(expected));
+        if expected + 1 == counts.state_out + counts.state_unsent + counts.state_out {
+            break; // as many as may be on their way
+        }
+    }
+    assert!(hub.counts(number).expect("known").state_out > counts.state_out);
+}
+
+#[test]
 fn oversized_and_meaningless_frames_are_counted_and_do_no_harm() {
     let (hub, hub_events) = hub();
     let lobby = plain_client(hub.endpoint().port());

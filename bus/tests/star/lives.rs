@@ -8,7 +8,7 @@ use bus::line::{Line, LineConfig, LineEvent};
 use bus::queue::{Wake, recv_until};
 use bus::setup::Endpoint;
 use bus::switchboard::{HubEvent, Switchboard, SwitchboardConfig};
-use bus::{Error, Plane, Refusal};
+use bus::{Error, PROTOCOL_VERSION, Plane, Refusal};
 
 #[test]
 #[ignore = "a role: a participant that sends back what it gets"]
@@ -66,7 +66,7 @@ fn the_hub_says_why_it_lets_somebody_not_in() {
     assert_eq!(ask_for_line(&lobby, "AUV2", 1), Err("id: AUV2".into()));
     let replies = zenoh::Wait::wait(lobby.get("cpf/join/auv1?version=9;nonce=1")).expect("asking succeeds");
     let refusal = replies.recv().expect("an answer").into_result().expect_err("refused");
-    assert_eq!(refusal.payload().try_to_string().expect("text"), "version: 1 9");
+    assert_eq!(refusal.payload().try_to_string().expect("text"), format!("version: {PROTOCOL_VERSION} 9"));
 }
 
 #[test]

@@ -1,33 +1,28 @@
-//! Who hears whom: a directed graph on at most 64 vertices.
+//! Who hears whom: a directed graph.
 //!
 //! The arc (i, j) says that vehicle i *receives from* vehicle j, so row i of the adjacency matrix is N_i and
 //! information flows against the arcs. A two-way link is both arcs.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A directed graph without self-loops; each row is the set N_i as bits.
+/// A directed graph without self-loops; each row is the set N_i as bits, in as many machine words as n vertices take.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Graph {
-    rows: Vec<u64>,
+    n: usize,
+    /// Row after row, in one piece: a graph of a small fleet is one word per vehicle.
+    words: Vec<u64>,
 }
 
 impl Graph {
-    /// The most vertices a graph can have.
-    pub const MAX_VERTICES: usize = 64;
-
     /// The graph on `n` vertices in which nobody hears anybody.
-    ///
-    /// # Panics
-    /// If `n` exceeds [`Graph::MAX_VERTICES`].
     pub fn empty(n: usize) -> Graph {
-        assert!(n <= Self::MAX_VERTICES, "a graph has at most {} vertices, not {n}", Self::MAX_VERTICES);
-        Graph { rows: vec![0; n] }
+        Graph { n, words: vec![0; n * width(n)] }
     }
 
     /// The graph with these arcs (receiver i, sender j). A vehicle that hears itself is not an arc: (i, i) is ignored.
     ///
     /// # Panics
-    /// If `n` exceeds [`Graph::MAX_VERTICES`] or an arc names a vertex that is not below `n`.
+    /// If an arc names a vertex that is not below `n`.
     pub fn from_arcs(n: usize, arcs: &[(usize, usize)]) -> Graph {
         let mut graph = Graph::empty(n);
         for &(receiver, sender) in arcs {
@@ -49,14 +44,12 @@ impl Graph {
     }
 
     /// The graph in which everybody hears everybody else.
-    ///
-    /// # Panics
-    /// If `n` exceeds [`Graph::MAX_VERTICES`].
     pub fn complete(n: usize) -> Graph {
         let mut graph = Graph::empty(n);
         let everybody = all(n);
-        for (i, row) in graph.rows.iter_mut().enumerate() {
-            *row = everybody & !bit(i);
+        for i in 0..n {
+            graph.row_mut(i).copy_from_slice(&everybody);
+            graph.row_mut(i)[i / BITS] &= !bit(i);
         }
         graph
     }
@@ -71,50 +64,62 @@ impl Graph {
         if receiver == sender {
             return;
         }
+        let word = &mut self.row_mut(receiver)[sender / BITS];
         if hears {
-            self.rows[receiver] |= bit(sender);
+            *word |= bit(sender);
         } else {
-            self.rows[receiver] &= !bit(sender);
+            *word &= !bit(sender);
         }
     }
 
     /// The graph with the arcs of both (section 4.2.3); the larger vertex set is kept.
     pub fn union(&self, other: &Graph) -> Graph {
         let (mut large, small) = if self.len() >= other.len() { (self.clone(), other) } else { (other.clone(), self) };
-        for (row, more) in large.rows.iter_mut().zip(&small.rows) {
-            *row |= more;
+        for i in 0..small.len() {
+            join(large.row_mut(i), small.row(i));
         }
         large
     }
 
     /// The number of vertices n.
     pub fn len(&self) -> usize {
-        self.rows.len()
+        self.n
     }
 
     /// Whether there is no vertex at all.
     pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
+        self.n == 0
     }
 
     /// Whether i receives from j; false for vertices that do not exist.
     pub fn hears(&self, i: usize, j: usize) -> bool {
-        i < self.len() && j < self.len() && self.rows[i] & bit(j) != 0
+        j < self.n && has(self.row(i), j)
     }
 
     /// N_i in increasing order; empty for a vertex that does not exist.
-    pub fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
-        members(self.rows.get(i).copied().unwrap_or(0))
+    pub fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + use<'_> {
+        members(self.row(i))
     }
 
     /// |N_i|.
     pub fn degree(&self, i: usize) -> usize {
-        self.rows.get(i).map_or(0, |row| row.count_ones() as usize)
+        self.row(i).iter().map(|word| word.count_ones() as usize).sum()
     }
 
     /// The arcs (receiver, sender), by receiver and then by sender.
     pub fn arcs(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.len()).flat_map(|i| self.neighbours(i).map(move |j| (i, j)))
+    }
+
+    /// N_i as bits; nothing for a vertex that does not exist.
+    fn row(&self, i: usize) -> &[u64] {
+        let width = width(self.n);
+        self.words.get(i * width..(i + 1) * width).unwrap_or_default()
+    }
+
+    fn row_mut(&mut self, i: usize) -> &mut [u64] {
+        let width = width(self.n);
+        &mut self.words[i * width..(i + 1) * width]
     }
 
     /// Adjacency matrix A: a_ij = 1 iff j ∈ N_i.
@@ -168,42 +173,73 @@ impl Graph {
 
     /// The vertices that everybody hears, directly or through others: reachable from every other along arcs i → j.
     pub fn globally_reachable(&self) -> Vec<usize> {
-        members(self.globally_reachable_bits()).collect()
+        members(&self.globally_reachable_bits()).collect()
     }
 
     /// Whether agreement is possible (Lemma 3.9): some vertex is globally reachable. Connectedness, if undirected.
     pub fn can_agree(&self) -> bool {
-        self.globally_reachable_bits() != 0
+        self.globally_reachable_bits().iter().any(|word| *word != 0)
     }
 
-    fn globally_reachable_bits(&self) -> u64 {
-        // Warshall's transitive closure, one machine word per row.
-        let mut reach: Vec<u64> = self.rows.iter().enumerate().map(|(i, row)| row | bit(i)).collect();
-        for k in 0..reach.len() {
-            let beyond_k = reach[k];
-            for from_i in &mut reach {
-                if *from_i & bit(k) != 0 {
-                    *from_i |= beyond_k;
+    fn globally_reachable_bits(&self) -> Vec<u64> {
+        // Warshall's transitive closure, a row of machine words at a time.
+        let mut reach = self.clone();
+        for i in 0..self.n {
+            reach.row_mut(i)[i / BITS] |= bit(i);
+        }
+        for k in 0..self.n {
+            let beyond_k = reach.row(k).to_vec();
+            for i in 0..self.n {
+                let from_i = reach.row_mut(i);
+                if has(from_i, k) {
+                    join(from_i, &beyond_k);
                 }
             }
         }
-        reach.into_iter().fold(all(self.len()), |common, from_i| common & from_i)
+        let mut common = all(self.n);
+        for i in 0..self.n {
+            common.iter_mut().zip(reach.row(i)).for_each(|(common, from_i)| *common &= from_i);
+        }
+        common
     }
 }
 
+const BITS: usize = u64::BITS as usize;
+
+/// How many words a row of `n` bits takes.
+fn width(n: usize) -> usize {
+    n.div_ceil(BITS)
+}
+
+/// The bit of a vertex in its word.
 fn bit(vertex: usize) -> u64 {
-    1 << vertex
+    1 << (vertex % BITS)
 }
 
-fn all(n: usize) -> u64 {
-    if n == 64 { u64::MAX } else { bit(n) - 1 }
+fn has(row: &[u64], vertex: usize) -> bool {
+    row.get(vertex / BITS).is_some_and(|word| word & bit(vertex) != 0)
 }
 
-fn members(mut set: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lowest = (set != 0).then(|| set.trailing_zeros() as usize)?;
-        set &= set - 1;
-        Some(lowest)
+fn join(row: &mut [u64], more: &[u64]) {
+    row.iter_mut().zip(more).for_each(|(word, more)| *word |= more);
+}
+
+fn all(n: usize) -> Vec<u64> {
+    let mut words = vec![u64::MAX; width(n)];
+    if let Some(last) = words.last_mut().filter(|_| !n.is_multiple_of(BITS)) {
+        *last = bit(n) - 1;
+    }
+    words
+}
+
+fn members(row: &[u64]) -> impl Iterator<Item = usize> {
+    row.iter().enumerate().flat_map(|(index, word)| {
+        let mut set = *word;
+        std::iter::from_fn(move || {
+            let lowest = (set != 0).then(|| set.trailing_zeros() as usize)?;
+            set &= set - 1;
+            Some(index * BITS + lowest)
+        })
     })
 }
 
@@ -254,9 +290,6 @@ mod tests {
         assert!(!Graph::empty(0).can_agree() && Graph::empty(0).is_connected());
         assert!(Graph::empty(1).can_agree() && Graph::empty(1).is_connected());
         assert!(!Graph::empty(2).can_agree());
-        let full = Graph::complete(64);
-        assert_eq!((full.degree(63), full.globally_reachable().len()), (63, 64));
-        assert_eq!(full.arcs().count(), 64 * 63);
     }
 
     #[test]
@@ -268,9 +301,22 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "at most 64")]
-    fn too_many_vertices_are_refused() {
-        Graph::empty(65);
+    fn fleets_of_more_than_a_word_are_as_good_as_small_ones() {
+        for n in [63, 64, 65, 128, 129, 200, 256] {
+            let full = Graph::complete(n);
+            assert_eq!((full.degree(n - 1), full.arcs().count()), (n - 1, n * (n - 1)));
+            assert_eq!(full.neighbours(0).collect::<Vec<_>>(), (1..n).collect::<Vec<_>>());
+            assert_eq!(full.globally_reachable().len(), n);
+            // A chain in which each hears the one before: all hear the first, through others.
+            let mut chain = Graph::from_arcs(n, &(1..n).map(|i| (i, i - 1)).collect::<Vec<_>>());
+            assert_eq!(chain.globally_reachable(), [0]);
+            assert!(chain.is_connected() && chain.hears(n - 1, n - 2) && !chain.hears(n - 2, n - 1));
+            chain.set(n - 1, n - 2, false);
+            assert!(!chain.can_agree() && !chain.is_connected());
+            assert!(chain.union(&Graph::from_arcs(n, &[(n - 1, 0)])).can_agree());
+        }
+        let larger = Graph::from_arcs(65, &[(64, 0)]).union(&Graph::complete(3));
+        assert_eq!(larger.arcs().count(), 7);
     }
 
     #[test]

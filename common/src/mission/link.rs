@@ -20,6 +20,8 @@ pub struct Link {
     pub corrupt: f64,
     /// Whether a message that would overtake an earlier one arrives with it.
     pub in_order: bool,
+    /// Most messages under way.
+    pub queue: usize,
 }
 
 /// A delay and a loss with a stream of random numbers of their own.

@@ -81,8 +81,6 @@ pub struct Mission {
     pub links: Vec<Link>,
     /// Which links are up when.
     pub switching: Switching,
-    /// Most messages under way on one directed link.
-    pub queue: usize,
     /// The medium that all vehicles share, if messages take time to send or disturb one another.
     pub medium: Option<Medium>,
 }
@@ -139,6 +137,11 @@ impl Mission {
     /// Index of a vehicle by its id.
     pub fn index_of(&self, id: &str) -> Option<usize> {
         self.vehicles.iter().position(|vehicle| vehicle.id == id)
+    }
+
+    /// The period at which vehicles speak, or look whether they should.
+    pub fn message_period(&self) -> Span {
+        self.control_period * self.message_ticks
     }
 
     /// The graph of all links: who can ever hear whom.

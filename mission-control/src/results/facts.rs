@@ -18,7 +18,7 @@ pub struct Facts {
     pub vehicles: Vec<VehicleFacts>,
     /// The directed links (from, to) of the network.
     pub links: Vec<(String, String)>,
-    /// Size of one message on the air, of vehicles that have no size of their own \[bytes\].
+    /// Size of one message on the air, as the medium packs it, of vehicles that have no size of their own \[bytes\].
     pub message_bytes: u64,
     /// Length of the mission \[s\].
     pub duration_s: f64,

@@ -8,7 +8,7 @@ use std::path::Path;
 use bus::recording::Recording;
 use serde::Serialize;
 
-use super::{Facts, GraphFacts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
+use super::{ClockSummary, Facts, GraphFacts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
 
 /// What the caller has to tell in the report besides numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,7 +37,7 @@ pub fn write_run_folder(
     facts: &Facts,
     theory: impl FnOnce(&Summary) -> Theory,
     account: &Account,
-) -> io::Result<Summary> {
+) -> io::Result<(Summary, ClockSummary)> {
     let directory = directory.as_ref();
     let (mut summary, clock) = (summarise(recording, facts), summarise_clock(recording));
     let Theory { rows: theory, envelope } = theory(&summary);
@@ -69,7 +69,7 @@ pub fn write_run_folder(
     write(&directory.join("theory.json"), &json(&theory)?)?;
     write(&directory.join("clock.json"), &json(&clock)?)?;
     write(&directory.join("report.html"), page.as_bytes())?;
-    Ok(summary)
+    Ok((summary, clock))
 }
 
 /// `theory.json`: as `check --json` has it.
@@ -135,7 +135,7 @@ mod tests {
             notes: vec!["simulated".into()],
             reproduce: vec!["mission-control simulate mission.toml --seed 42".into()],
         };
-        write_run_folder(directory, &fleet(spatial), &facts(spatial), theory, &account).expect("writes")
+        write_run_folder(directory, &fleet(spatial), &facts(spatial), theory, &account).expect("writes").0
     }
 
     fn files(directory: &Path) -> Vec<(OsString, Vec<u8>)> {
@@ -167,7 +167,7 @@ mod tests {
         let write = |envelope| {
             let said = |_: &Summary| Theory { rows: Vec::new(), envelope };
             let (facts, account) = (facts(true), Account::default());
-            let summary = write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");
+            let (summary, _) = write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");
             let drawn = fs::read_to_string(directory.path().join("figures/rate.svg")).expect("reads");
             (summary.fleet.coordination.at_least_guaranteed, drawn.contains("guaranteed: 0.020 /s"))
         };

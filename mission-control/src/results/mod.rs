@@ -20,6 +20,7 @@ mod folder;
 mod graph;
 mod legend;
 pub(crate) mod network;
+mod punctuality;
 pub(crate) mod report;
 mod series;
 pub(crate) mod statistics;
@@ -36,11 +37,12 @@ pub use figures::{Figure, figures};
 pub use folder::{Account, Theory, write_run_folder};
 pub use graph::{GraphFacts, SpanningFacts, SplitFacts, TakenFacts};
 pub use network::{Connectivity, LinkSummary, Network, Spread};
+pub use punctuality::ClockVerdict;
 pub use report::{BELOW, Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
 pub use statistics::{ExponentialFit, FIT_PART, fit_coordination, fit_exponential, settling_time};
 pub use summary::{
     Absence, ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals,
-    NoteSummary, Summary, VehicleSummary, summarise, summarise_clock,
+    NoteSummary, OverrunSummary, Summary, VehicleSummary, summarise, summarise_clock,
 };
 pub use trace::network_section;

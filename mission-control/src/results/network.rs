@@ -33,6 +33,8 @@ pub struct LinkSummary {
     pub collision: u64,
     /// Handed over with a flipped bit, and dropped by the receiver.
     pub corrupt: u64,
+    /// Dropped because there was no process of the receiver.
+    pub receiver_absent: u64,
     /// Under way when the mission ended.
     pub in_flight: u64,
     /// Second copies handed to the receiver; they do not count as sent.
@@ -86,7 +88,8 @@ pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<L
         }
     }
     let named: Vec<(&str, &str)> = facts.links.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect();
-    let others = messages.keys().copied().filter(|link| !named.contains(link)).collect::<Vec<_>>();
+    let known: BTreeSet<(&str, &str)> = named.iter().copied().collect();
+    let others = messages.keys().copied().filter(|link| !known.contains(link)).collect::<Vec<_>>();
     let all = named.into_iter().chain(others);
     all.map(|(from, to)| {
         let rows = messages.get(&(from, to)).map_or(&[][..], Vec::as_slice);
@@ -134,6 +137,7 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
         half_duplex: count(Fate::HalfDuplex),
         collision: count(Fate::Collision),
         corrupt: count(Fate::Corrupt),
+        receiver_absent: count(Fate::ReceiverAbsent),
         copied: count(Fate::Copied),
         copy_dropped: count(Fate::CopyDropped),
         copy_in_flight: count(Fate::CopyInFlight),
@@ -148,12 +152,13 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
     LinkSummary { balanced: summary.sent == accounted && missing == 0 && repeated == 0, ..summary }
 }
 
-/// Number of transmissions by sender: a message to several receivers goes on the air once.
+/// Number of transmissions by sender: a message to several receivers goes on the air once, and one that found no place in its
+/// sender's queue, or still waited there at the end, never.
 pub(super) fn transmissions(exact: &[Record]) -> BTreeMap<&str, u64> {
     let mut sent: Vec<(&str, i64, u64)> = exact
         .iter()
         .filter_map(|record| match record {
-            Record::Message(row) => Some((&*row.from, row.sent_ns, row.seq)),
+            Record::Message(row) if was_on_air(row) => Some((&*row.from, row.sent_ns, row.seq)),
             _ => None,
         })
         .collect();
@@ -162,6 +167,11 @@ pub(super) fn transmissions(exact: &[Record]) -> BTreeMap<&str, u64> {
     let mut by_sender = BTreeMap::new();
     sent.iter().for_each(|(from, ..)| *by_sender.entry(*from).or_default() += 1);
     by_sender
+}
+
+/// What never left its sender has no instant at which it was to arrive: it stands as due when that was decided.
+fn was_on_air(row: &MessageRow) -> bool {
+    !([Fate::QueueFull, Fate::InFlight].contains(&row.fate) && row.due_ns == row.t_ns)
 }
 
 /// The links over time.
@@ -524,10 +534,32 @@ mod tests {
             link.half_duplex,
             link.collision,
             link.corrupt,
+            link.receiver_absent,
         ];
-        assert_eq!(causes, [1; 7]);
+        assert_eq!(causes, [1; 8]);
         assert_eq!((link.copied, link.copy_dropped, link.copy_in_flight), (1, 1, 1));
-        assert_eq!((link.sent, link.delivered, link.repeated, link.balanced), (7, 0, 0, true));
+        assert_eq!((link.sent, link.delivered, link.repeated, link.balanced), (8, 0, 0, true));
+    }
+
+    #[test]
+    fn what_never_left_its_sender_was_not_on_the_air() {
+        let row = |seq: u64, to: &str, fate, waits: i64| {
+            let (t_ns, sent_ns) = (seq as i64 + 5, seq as i64);
+            let (from, to) = ("1".into(), to.into());
+            Record::Message(MessageRow { t_ns, from, to, seq, sent_ns, due_ns: t_ns + waits, fate })
+        };
+        let rows = [
+            row(0, "2", Fate::Delivered, 0),
+            // No place at the sender, on either link; then one that was sent and found no place on one link.
+            row(1, "2", Fate::QueueFull, 0),
+            row(1, "3", Fate::QueueFull, 0),
+            row(2, "2", Fate::QueueFull, 9),
+            row(2, "3", Fate::Lost, 9),
+            // Under way, and still waiting, at the end.
+            row(3, "2", Fate::InFlight, 9),
+            row(4, "2", Fate::InFlight, 0),
+        ];
+        assert_eq!(transmissions(&rows).get("1"), Some(&3));
     }
 
     #[test]

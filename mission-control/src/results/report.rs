@@ -280,6 +280,9 @@ fn vehicles(page: &mut String, report: &Report<'_>) {
     let _ = write!(page, "<p class=\"remark\">{}</p>\n</section>\n", sentences.join(" "));
 }
 
+/// Most links in the table.
+const MOST_LINKS: usize = 300;
+
 fn network(page: &mut String, report: &Report<'_>) {
     let links = &report.summary.links;
     if links.is_empty() {
@@ -299,6 +302,7 @@ fn network(page: &mut String, report: &Report<'_>) {
         ("deaf while speaking", |link| link.half_duplex, totals.half_duplex, false),
         ("collided", |link| link.collision, totals.collision, false),
         ("corrupt", |link| link.corrupt, totals.corrupt, false),
+        ("receiver absent", |link| link.receiver_absent, totals.receiver_absent, false),
         ("in flight", |link| link.in_flight, totals.in_flight, true),
         ("second copies", |link| link.copied, totals.copied, false),
     ]
@@ -327,11 +331,22 @@ fn network(page: &mut String, report: &Report<'_>) {
         cells.extend(["", "", "", ""].map(str::to_owned));
         cells
     });
-    table(page, "numbers", &header, links.iter().map(row).chain(sum));
-    let mut sentences = vec![format!(
+    // A complete graph of two hundred vehicles would be a page of its own.
+    let mut shown: Vec<&LinkSummary> = links.iter().collect();
+    if shown.len() > MOST_LINKS {
+        shown.sort_by_key(|link| std::cmp::Reverse(link.sent - link.delivered.min(link.sent)));
+        shown.truncate(MOST_LINKS);
+    }
+    table(page, "numbers", &header, shown.iter().map(|link| row(link)).chain(sum));
+    let mut sentences = Vec::new();
+    if shown.len() < links.len() {
+        let (few, all) = (shown.len(), links.len());
+        sentences.push(format!("The {few} of {all} links that delivered least; all are in <code>summary.json</code>."));
+    }
+    sentences.push(format!(
         "{} transmissions of at most {} bytes: {} bytes on the air.",
         totals.transmissions, totals.message_bytes, totals.bytes_on_air
-    )];
+    ));
     if let Some(connectivity) = report.summary.fleet.connectivity {
         let mut sentence = format!("Measured loss of connectivity: α = {}", number(connectivity.alpha));
         if let Some(t_0_s) = connectivity.t_0_s {
@@ -346,10 +361,10 @@ fn network(page: &mut String, report: &Report<'_>) {
 }
 
 fn clock(page: &mut String, clock: &ClockSummary) {
-    if clock.deliveries.is_none() && clock.deadlines.is_empty() {
-        return;
-    }
+    let Some(verdict) = &clock.verdict else { return };
     page.push_str("<section>\n<h2>On the clock</h2>\n");
+    let class = if verdict.kept_time { "good" } else { "attention" };
+    let _ = writeln!(page, "<p class=\"verdict {class}\">{}</p>", escape(&verdict.text));
     if !clock.deadlines.is_empty() {
         let row = |deadlines: &super::DeadlineSummary| {
             let missed = match deadlines.missed {
@@ -371,6 +386,13 @@ fn clock(page: &mut String, clock: &ClockSummary) {
              (median), {} ms (99 %), {} ms (worst).</p>",
             deliveries.count, late[0], late[1], late[2]
         );
+    }
+    if !clock.overruns.is_empty() {
+        let row = |overrun: &super::OverrunSummary| {
+            vec![escape(&overrun.vehicle), overrun.place.as_str().to_owned(), overrun.count.to_string()]
+        };
+        let header = ["vehicle", "where the oldest messages were dropped for want of time", "messages"];
+        table(page, "numbers names-2", &header, clock.overruns.iter().map(row));
     }
     page.push_str("</section>\n");
 }

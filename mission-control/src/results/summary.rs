@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use bus::recording::Recording;
-use common::record::{ClockRecord, Record, SpeedRow, StateRow};
+use common::record::{ClockRecord, Overrun, Record, SpeedRow, StateRow};
 use common::time::Time;
 use serde::Serialize;
 
 use super::Facts;
 use super::network::{Connectivity, LinkSummary, Network, Spread, links, transmissions};
+use super::punctuality::{ClockVerdict, verdict};
 use super::series::{Coordination, Track, speeds, tracks};
 use super::statistics::{ExponentialFit, FIT_PART, fit_coordination, largest, mean, rms, settling_time, steady_from};
 
@@ -166,6 +167,8 @@ pub struct MessageTotals {
     pub collision: u64,
     /// Handed over with a flipped bit, and dropped by the receiver.
     pub corrupt: u64,
+    /// Dropped because there was no process of the receiver.
+    pub receiver_absent: u64,
     /// Under way at the end.
     pub in_flight: u64,
     /// Second copies handed to the receiver; they do not count as sent.
@@ -174,9 +177,9 @@ pub struct MessageTotals {
     pub copy_dropped: u64,
     /// Second copies under way when the mission ended.
     pub copy_in_flight: u64,
-    /// Transmissions: a message to several receivers goes on the air once.
+    /// Transmissions: a message to several receivers goes on the air once; one that found no place in its sender's queue never.
     pub transmissions: u64,
-    /// Size of one message; of the largest, where they differ \[bytes\].
+    /// Size of one message on the air, as the medium packs it; of the largest, where they differ \[bytes\].
     pub message_bytes: u64,
     /// Transmissions, each times its size.
     pub bytes_on_air: u64,
@@ -244,8 +247,23 @@ pub struct ClockSummary {
     pub deliveries: Option<DeliverySummary>,
     /// Deadlines of the control loops.
     pub deadlines: Vec<DeadlineSummary>,
+    /// Messages that no model of the network dropped, but a program or session that did not keep up.
+    pub overruns: Vec<OverrunSummary>,
+    /// Whether the machine kept time; `None` without a real clock.
+    pub verdict: Option<ClockVerdict>,
     /// What the programs had to say.
     pub notes: Vec<NoteSummary>,
+}
+
+/// Messages dropped for want of time or room.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OverrunSummary {
+    /// Whose messages, or on the way to whom.
+    pub vehicle: String,
+    /// Where.
+    pub place: Overrun,
+    /// How many; the oldest.
+    pub count: u64,
 }
 
 /// Lateness of deliveries.
@@ -332,6 +350,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
 /// The numbers of a run that depend on the wall clock.
 pub fn summarise_clock(recording: &Recording) -> ClockSummary {
     let (mut commanded, mut late) = (Vec::new(), Vec::new());
+    let mut overruns: BTreeMap<(&str, Overrun), u64> = BTreeMap::new();
     let mut summary = ClockSummary { format: 1, ..ClockSummary::default() };
     for record in &recording.clock {
         match record {
@@ -355,6 +374,7 @@ pub fn summarise_clock(recording: &Recording) -> ClockSummary {
                     }),
                 }
             }
+            ClockRecord::Overrun(row) => *overruns.entry((row.vehicle.as_ref(), row.place)).or_default() += row.count,
             ClockRecord::Note(row) => summary.notes.push(NoteSummary {
                 t_s: row.t_ns as f64 / 1e9,
                 source: row.source.clone(),
@@ -369,6 +389,12 @@ pub fn summarise_clock(recording: &Recording) -> ClockSummary {
         commanded_s,
         late_s,
     });
+    let overrun = |((vehicle, place), count): ((&str, Overrun), u64)| {
+        let vehicle = vehicle.to_owned();
+        OverrunSummary { vehicle, place, count }
+    };
+    summary.overruns = overruns.into_iter().map(overrun).collect();
+    summary.verdict = verdict(&summary);
     summary
 }
 
@@ -500,6 +526,7 @@ fn totals(links: &[LinkSummary], said: &BTreeMap<&str, u64>, facts: &Facts) -> M
         half_duplex: sum(|link| link.half_duplex),
         collision: sum(|link| link.collision),
         corrupt: sum(|link| link.corrupt),
+        receiver_absent: sum(|link| link.receiver_absent),
         copied: sum(|link| link.copied),
         copy_dropped: sum(|link| link.copy_dropped),
         copy_in_flight: sum(|link| link.copy_in_flight),
@@ -603,6 +630,7 @@ mod tests {
         assert_eq!((late.median, late.max), (60e-6, 2e-3));
         assert_eq!(clock.deadlines.iter().map(|deadlines| deadlines.missed).sum::<u64>(), 6);
         assert_eq!(clock.notes.len(), 1);
+        assert!(clock.verdict.is_some_and(|verdict| !verdict.kept_time));
         assert_eq!(summarise_clock(&without), ClockSummary { format: 1, ..ClockSummary::default() });
     }
 

@@ -124,8 +124,10 @@ pub(super) fn fleet(spatial: bool) -> Recording {
                         (_, _, true) => Fate::Lost,
                         _ => Fate::Delivered,
                     };
+                // What is under way at the end is recorded then.
+                let decided_ns = due_ns.min(400_000_000_000);
                 let row =
-                    MessageRow { t_ns: due_ns, from: from.into(), to: to.into(), seq, sent_ns: t_ns, due_ns, fate };
+                    MessageRow { t_ns: decided_ns, from: from.into(), to: to.into(), seq, sent_ns: t_ns, due_ns, fate };
                 exact.push(Record::Message(row));
             }
         }

@@ -45,7 +45,7 @@ pub(super) fn rows_of_a_told_vehicle(case: &Case<'_>, law: &TrulyDecentralised) 
 /// 𝒢_{n+1}: the graph with the virtual leader, whom the told vehicle hears.
 pub(super) fn with_leader(mission: &Mission, graph: &Graph, law: &TrulyDecentralised) -> Option<Graph> {
     let n = graph.len();
-    let told = mission.index_of(&law.told).filter(|_| n < Graph::MAX_VERTICES)?;
+    let told = mission.index_of(&law.told)?;
     let arcs: Vec<(usize, usize)> = graph.arcs().chain([(told, n)]).collect();
     Some(Graph::from_arcs(n + 1, &arcs))
 }

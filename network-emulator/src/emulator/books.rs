@@ -39,6 +39,7 @@ impl Emulator {
             let fate = if message.copy { Fate::CopyInFlight } else { Fate::InFlight };
             self.record_message(now, &message, fate);
         }
+        self.turns.clear();
         for vehicle in 0..self.senders.len() {
             for parcel in self.senders[vehicle].rest() {
                 for slot in 0..self.out[vehicle].len() {
@@ -64,19 +65,20 @@ impl Emulator {
     }
 
     fn record_message(&mut self, t: Time, message: &UnderWay, fate: Fate) {
-        self.record_settled(t, message, fate, None);
+        self.outputs.push_back(Channel::Settled(settled(t, message, fate, None)));
     }
+}
 
-    pub(super) fn record_settled(&mut self, t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i64>) {
-        self.outputs.push_back(Channel::Settled(Settled {
-            t_ns: t.nanos(),
-            link: message.link,
-            seq: message.parcel.number,
-            sent_ns: message.parcel.sent.nanos(),
-            due_ns: message.due.nanos(),
-            fate,
-            late_ns,
-        }));
+/// What is written down of a message whose fate was decided at `t`.
+pub(super) fn settled(t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i64>) -> Settled {
+    Settled {
+        t_ns: t.nanos(),
+        link: message.link,
+        seq: message.parcel.number,
+        sent_ns: message.parcel.sent.nanos(),
+        due_ns: message.due.nanos(),
+        fate,
+        late_ns,
     }
 }
 

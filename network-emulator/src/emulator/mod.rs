@@ -22,21 +22,21 @@ mod tests;
 mod wire;
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::{BTreeSet, BinaryHeap, VecDeque};
 use std::sync::Arc;
 
 use common::graph::switching::Switching;
 use common::machine::Machine;
 use common::mission::{Link, Mission};
-use common::network::Whereabouts;
+use common::network::{Medium, Whereabouts};
 use common::random::Stream;
 use common::record::{ClockRecord, Fate, Name, NoteRow, Record, Row, Settled, TopologyRow};
 use common::time::{Span, Time};
 use common::wire::state::CoordinationState;
 use common::wire::{Garbage, GarbageCount};
 
-use self::air::Air;
-use self::books::unsent;
+use self::air::{Air, Place};
+use self::books::{settled, unsent};
 use self::parcel::{Parcel, UnderWay};
 use self::sender::Sender;
 use self::wire::{Wire, flip};
@@ -61,6 +61,8 @@ pub enum Channel {
         due: Time,
         /// The bytes.
         bytes: Arc<[u8]>,
+        /// On a real clock, what is to be recorded of a delivery by who hands it over: how late that was is known then.
+        settled: Option<Settled>,
     },
     /// Record this row.
     Record(Row),
@@ -77,7 +79,12 @@ pub struct Emulator {
     /// Indices into `links`, by sender.
     out: Vec<Vec<usize>>,
     switching: Switching,
+    /// Which links the switching signal has up.
     up: Vec<bool>,
+    /// Which vehicles can be reached: all of them, but in real time.
+    present: Vec<bool>,
+    /// Which links were last recorded as up: those of the signal whose two ends are present.
+    recorded_up: Vec<bool>,
     next_change: Option<Time>,
     under_way: BinaryHeap<Reverse<UnderWay>>,
     /// Number of the newest message taken from each vehicle, to tell a repetition.
@@ -90,6 +97,8 @@ pub struct Emulator {
     whereabouts: Option<Whereabouts>,
     /// On a shared medium: who waits to speak, and what is arriving at whom; empty without.
     senders: Vec<Sender>,
+    /// Who speaks when; at the same instant by index.
+    turns: BTreeSet<(Time, usize)>,
     airs: Vec<Air>,
     receptions: u64,
     garbage: Vec<GarbageCount>,
@@ -118,6 +127,8 @@ impl Emulator {
             out,
             switching: mission.switching.clone(),
             up: vec![false; mission.links.len()],
+            present: vec![true; n],
+            recorded_up: vec![false; mission.links.len()],
             next_change: Some(Time::ZERO),
             under_way: BinaryHeap::new(),
             newest: vec![None; n],
@@ -125,6 +136,7 @@ impl Emulator {
             taken: vec![0; n],
             whereabouts: mission.links.iter().any(Link::needs_distance).then(|| Whereabouts::new(places)),
             senders: if shared { mission.vehicles.iter().enumerate().map(sender).collect() } else { Vec::new() },
+            turns: BTreeSet::new(),
             airs: (0..if shared { n } else { 0 }).map(|_| Air::default()).collect(),
             receptions: 0,
             garbage: vec![GarbageCount::default(); n],
@@ -143,20 +155,25 @@ impl Emulator {
         }
     }
 
-    /// Nothing passed from `gone` on until the present, `back`: every link was down, and is now as planned.
+    /// Nothing passed from `gone` on until the present, `back`: every link was down, and is now as planned, if its two ends are
+    /// present.
     pub fn was_away(&mut self, gone: Time, back: Time) {
-        for (t, away) in [(gone, true), (back, false)] {
-            for index in 0..self.links.len() {
-                self.record_topology(t, index, !away && self.up[index]);
-            }
+        for index in 0..self.links.len() {
+            self.record_topology(gone, index, false);
         }
+        self.recorded_up.fill(false);
+        self.record_links(back, false);
     }
 
-    fn record_topology(&mut self, t: Time, link: usize, up: bool) {
-        let name = |vehicle: usize| self.names[vehicle].clone();
-        let (from, to) = (name(self.links[link].from), name(self.links[link].to));
-        let row = TopologyRow { t_ns: t.nanos(), from, to, up };
-        self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));
+    /// In real time a vehicle's process comes and goes: while there is none, nobody hears what is sent to it, and its links
+    /// are down. What is under way from it still arrives.
+    pub fn presence(&mut self, now: Time, vehicle: usize, present: bool) {
+        if self.present.get(vehicle).is_none_or(|before| *before == present) {
+            return;
+        }
+        self.catch_up(now, now);
+        self.present[vehicle] = present;
+        self.record_links(now, false);
     }
 
     /// Takes a message from a vehicle: one decision per directed link.
@@ -186,8 +203,8 @@ impl Emulator {
                 self.transmit(&parcel, link, now, Span::ZERO);
             }
         }
-        if let Some(medium) = &self.mission.medium
-            && let Some(dropped) = self.senders[sent.from].take(medium, parcel)
+        if self.mission.medium.is_some()
+            && let Some(dropped) = self.replan(sent.from, |sender, medium| sender.take(medium, parcel))
         {
             for slot in 0..self.out[sent.from].len() {
                 let message = unsent(now, &dropped, self.out[sent.from][slot]);
@@ -199,13 +216,27 @@ impl Emulator {
 
     /// A vehicle's turn has come to speak.
     fn speak(&mut self, t: Time, vehicle: usize) {
+        let Some(parcel) = self.replan(vehicle, |sender, medium| sender.speak(medium)) else { return };
         let Some(medium) = &self.mission.medium else { return };
-        let Some(parcel) = self.senders[vehicle].speak(medium) else { return };
         let airtime = medium.airtime(parcel.bytes.len());
         self.airs[vehicle].speak(medium, t, t + airtime);
         for slot in 0..self.out[vehicle].len() {
             self.transmit(&parcel, self.out[vehicle][slot], t, airtime);
         }
+    }
+
+    /// Has a sender do something that may change when it speaks next.
+    fn replan<T>(&mut self, vehicle: usize, act: impl FnOnce(&mut Sender, &Medium) -> Option<T>) -> Option<T> {
+        let medium = self.mission.medium.as_ref()?;
+        let sender = &mut self.senders[vehicle];
+        if let Some(before) = sender.next() {
+            self.turns.remove(&(before, vehicle));
+        }
+        let done = act(sender, medium);
+        if let Some(next) = sender.next() {
+            self.turns.insert((next, vehicle));
+        }
+        done
     }
 
     /// A message leaves its sender on one link: dropped at once, or under way.
@@ -216,7 +247,7 @@ impl Emulator {
             _ => 0.0,
         };
         let bits = 8 * parcel.bytes.len();
-        let verdict = wire.decide(parcel.seq, bits, (start, airtime), distance, self.mission.queue);
+        let verdict = wire.decide(parcel.seq, bits, (start, airtime), distance);
         let (due, corrupt) = (verdict.due, verdict.flipped.is_some());
         let mut message = UnderWay { due, parcel: parcel.clone(), link, copy: false, corrupt, reception: None };
         if let Some(cause) = verdict.dropped {
@@ -230,20 +261,25 @@ impl Emulator {
             self.under_way.push(Reverse(UnderWay { due, copy: true, ..message.clone() }));
         }
         if let Some(medium) = &self.mission.medium {
-            self.airs[wire.to].enter(medium, self.receptions, due - airtime, due);
-            message.reception = Some(self.receptions);
+            let place = Place { begin: due - airtime, key: self.receptions };
+            self.airs[wire.to].enter(medium, place, wire.from, due);
+            message.reception = Some(place);
             self.receptions += 1;
         }
         self.under_way.push(Reverse(message));
     }
 
     /// A message has come to the end of its way: it is received if the link is up at that instant (p(t) gates reception,
-    /// erratum 4.22), and nothing spoilt it meanwhile.
+    /// erratum 4.22), its receiver is there, and nothing spoilt it meanwhile.
     fn arrive(&mut self, now: Time, message: UnderWay) {
         let to = self.links[message.link].to;
-        let spoilt = message.reception.and_then(|key| self.airs[to].leave(key));
+        let spoilt = message.reception.and_then(|place| self.airs[to].leave(place));
         let arrived = if message.corrupt { Fate::Corrupt } else { Fate::Delivered };
-        let fate = if self.up[message.link] { spoilt.unwrap_or(arrived) } else { Fate::LinkDown };
+        let fate = match (self.up[message.link], self.present[to]) {
+            (false, _) => Fate::LinkDown,
+            (true, false) => Fate::ReceiverAbsent,
+            (true, true) => spoilt.unwrap_or(arrived),
+        };
         let handed_over = fate == arrived;
         let fate = match (message.copy, handed_over) {
             (false, _) => fate,
@@ -255,24 +291,45 @@ impl Emulator {
             .watch_delays
             .filter(|_| fate == Fate::Delivered)
             .map(|speed_up| ((now - message.due).nanos() as f64 / speed_up) as i64);
-        self.record_settled(message.due, &message, fate, late_ns);
-        if !handed_over {
-            return;
+        let mut settled = Some(settled(message.due, &message, fate, late_ns));
+        if late_ns.is_none() {
+            self.outputs.extend(settled.take().map(Channel::Settled));
         }
-        self.outputs.push_back(Channel::Deliver { to, due: message.due, bytes: message.parcel.bytes });
+        if handed_over {
+            self.outputs.push_back(Channel::Deliver { to, due: message.due, bytes: message.parcel.bytes, settled });
+        }
     }
 
     /// The switching signal changes at `t`: record the links that come or go.
     fn change(&mut self, t: Time, record: bool) {
         for index in 0..self.links.len() {
-            let up = self.switching.is_up(index, t);
-            let first = t == Time::ZERO;
-            if record && (first || up != self.up[index]) {
-                self.record_topology(t, index, up);
-            }
-            self.up[index] = up;
+            self.up[index] = self.switching.is_up(index, t);
+        }
+        if record {
+            self.record_links(t, t == Time::ZERO);
+        } else {
+            self.recorded_up.clone_from(&self.up);
         }
         self.next_change = self.switching.next_change_after(t).filter(|change| *change <= self.mission.end);
+    }
+
+    /// Records which links came or went, or how all of them are.
+    fn record_links(&mut self, t: Time, all: bool) {
+        for index in 0..self.links.len() {
+            let link = &self.links[index];
+            let up = self.up[index] && self.present[link.from] && self.present[link.to];
+            if all || up != self.recorded_up[index] {
+                self.record_topology(t, index, up);
+            }
+            self.recorded_up[index] = up;
+        }
+    }
+
+    fn record_topology(&mut self, t: Time, link: usize, up: bool) {
+        let name = |vehicle: usize| self.names[vehicle].clone();
+        let (from, to) = (name(self.links[link].from), name(self.links[link].to));
+        let row = TopologyRow { t_ns: t.nanos().max(0), from, to, up };
+        self.outputs.push_back(Channel::Record(Row::Exact(Record::Topology(row))));
     }
 
     /// Changes, transmissions and arrivals up to an instant, in the order of their instants. At the same instant the link
@@ -291,7 +348,7 @@ impl Emulator {
 
     /// Who speaks next, and when; the first of those who speak at the same instant.
     fn next_speaker(&self) -> Option<(Time, usize)> {
-        self.senders.iter().enumerate().filter_map(|(vehicle, sender)| Some((sender.next()?, vehicle))).min()
+        self.turns.first().copied()
     }
 }
 

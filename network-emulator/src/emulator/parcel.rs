@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use common::time::Time;
 
+use super::air::Place;
+
 /// A message as its sender gave it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Parcel {
@@ -28,8 +30,8 @@ pub(super) struct UnderWay {
     pub(super) copy: bool,
     /// A bit is flipped.
     pub(super) corrupt: bool,
-    /// Its entry in the receiver's [`super::air::Air`], if the medium is shared.
-    pub(super) reception: Option<u64>,
+    /// Its entry in the receiver's [`Air`](super::air::Air), if the medium is shared.
+    pub(super) reception: Option<Place>,
 }
 
 impl UnderWay {

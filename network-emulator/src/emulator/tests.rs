@@ -162,7 +162,11 @@ const LINKS: [(&str, &str); 4] = [("v1", "v2"), ("v2", "v1"), ("v2", "v3"), ("v3
 /// What became of the messages on the link between two vehicles, by number.
 fn fates(outputs: &[Channel], from: &str, to: &str) -> Vec<(u64, Fate)> {
     let fate = |output: &Channel| match output {
-        Channel::Settled(settled) if LINKS[settled.link] == (from, to) => Some((settled.seq, settled.fate)),
+        Channel::Settled(settled) | Channel::Deliver { settled: Some(settled), .. }
+            if LINKS[settled.link] == (from, to) =>
+        {
+            Some((settled.seq, settled.fate))
+        }
         _ => None,
     };
     let mut fates: Vec<(u64, Fate)> = outputs.iter().filter_map(fate).collect();
@@ -341,7 +345,7 @@ fn a_corrupt_message_is_handed_over_with_one_bit_flipped_and_counts_as_dropped()
 /// v1, v2 and v3 in a row over a shared medium where a message takes 1 s on the air.
 fn shared(more: &str) -> Arc<Mission> {
     mission(&format!(
-        "delay = {{ constant = {{ delay_s = 0.25 }} }}\nmedium = {{ rate_bps = 80.0, packet_bytes = 10, {more} }}"
+        "delay = {{ constant = {{ delay_s = 0.25 }} }}\nmedium = {{ rate_bps = 160.0, packet_bytes = 20, {more} }}"
     ))
 }
 
@@ -412,6 +416,119 @@ fn in_slots_nobody_disturbs_anybody() {
     // Slots of v1, v2, v3 begin at 0, 2 and 4 s of every 6 s; 1 s on the air, 0.25 s under way.
     let first: Vec<(usize, Time)> = deliveries(&outputs).into_iter().take(4).collect();
     assert_eq!(first, [(1, 1.25), (0, 3.25), (2, 3.25), (1, 5.25)].map(|(to, due)| (to, seconds(due))));
+}
+
+#[test]
+fn a_sender_that_comes_nearer_does_not_drown_its_own_words_and_the_guard_time_keeps_others_apart() {
+    // 1 s on the air, up to 5.05 s under way, slots of 10 s of which 6 s stay silent.
+    let mission = mission(
+        "delay = { distance = { speed_mps = 20.0 } }\n\
+         medium = { rate_bps = 160.0, packet_bytes = 20, queue = 5, half_duplex = true, collisions = true, \
+         slots = { slot_s = 10.0, guard_s = 6.0 } }",
+    );
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for round in 0..3u32 {
+        let begin = f64::from(round) * 30.0;
+        // v1 comes 10 m nearer between two words that go out one behind the other in its slot: the second begins to arrive
+        // half a second before the first has ended.
+        for (at, who, seq, xi) in [
+            (0.0, 0, 2 * round, 100.0),
+            (0.0, 1, 2 * round, 0.0),
+            (0.0, 2, 2 * round, 0.0),
+            (0.1, 0, 2 * round + 1, 90.0),
+            (0.1, 1, 2 * round + 1, 0.0),
+        ] {
+            let bytes = state_at(&mission, who, seq, xi);
+            emulator.handle(seconds(begin + at), Some(Sent { from: usize::from(who), bytes }));
+        }
+        emulator.handle(seconds(begin + 29.9), None);
+    }
+    let outputs = drain(&mut emulator);
+    let of_v1: Vec<i64> = outputs
+        .iter()
+        .filter_map(|output| match output {
+            Channel::Settled(settled) if settled.link == 0 => Some(settled.due_ns),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(of_v1.len(), 6);
+    assert!(of_v1[1] - of_v1[0] < 600_000_000, "they overlap for half a second: {of_v1:?}");
+    assert!(emulator.ledgers().all(|ledger| ledger.delivered() == ledger.sent), "{:?}", emulator.totals());
+}
+
+#[test]
+fn words_of_one_sender_that_overlap_are_still_spoilt_by_anothers() {
+    let mission = mission(
+        "delay = { distance = { speed_mps = 20.0 } }\nmedium = { rate_bps = 160.0, packet_bytes = 20, queue = 5, collisions = true }",
+    );
+    let mut emulator = Emulator::new(mission.clone(), None);
+    // v1's words arrive at v2 during [6.0, 7.0) and [6.5, 7.5), v3's during [6.2, 7.2).
+    for (at, who, seq, xi) in [(1.0, 0, 0, 100.0), (1.1, 0, 1, 90.0), (6.15, 2, 0, 0.0)] {
+        emulator.handle(seconds(at), Some(Sent { from: usize::from(who), bytes: state_at(&mission, who, seq, xi) }));
+    }
+    emulator.handle(seconds(20.0), None);
+    let outputs = drain(&mut emulator);
+    assert_eq!(fates(&outputs, "v1", "v2"), [(0, Fate::Collision), (1, Fate::Collision)]);
+    assert_eq!(fates(&outputs, "v3", "v2"), [(0, Fate::Collision)]);
+}
+
+#[test]
+fn who_is_absent_hears_nothing_and_its_links_are_down_until_it_is_back() {
+    let mission = mission("delay = { constant = { delay_s = 1.0 } }");
+    let mut emulator = Emulator::new(mission.clone(), Some(1.0));
+    drain(&mut emulator);
+    let say = |emulator: &mut Emulator, at: f64, from: usize, seq: u32| {
+        emulator.handle(seconds(at), Some(Sent { from, bytes: state(&mission, from as u16, seq) }));
+    };
+    say(&mut emulator, 1.0, 1, 0); // there when it arrives
+    say(&mut emulator, 2.5, 0, 0); // under way when its sender dies
+    say(&mut emulator, 2.6, 2, 0); // under way to v2, who stays
+    emulator.presence(seconds(3.0), 0, false);
+    emulator.presence(seconds(3.0), 0, false);
+    say(&mut emulator, 4.0, 1, 1); // nobody there
+    emulator.handle(seconds(5.5), None);
+    say(&mut emulator, 5.8, 1, 2); // back when it arrives
+    emulator.presence(seconds(6.0), 0, true);
+    emulator.handle(seconds(9.0), None);
+    let outputs = drain(&mut emulator);
+    assert_eq!(fates(&outputs, "v2", "v1"), [(0, Fate::Delivered), (1, Fate::ReceiverAbsent), (2, Fate::Delivered)]);
+    assert_eq!(fates(&outputs, "v1", "v2"), [(0, Fate::Delivered)]);
+    assert_eq!(fates(&outputs, "v2", "v3").iter().filter(|fate| fate.1 == Fate::Delivered).count(), 3);
+    let changes: Vec<(f64, String, bool)> = outputs
+        .iter()
+        .filter_map(|output| match output {
+            Channel::Record(Row::Exact(Record::Topology(row))) => {
+                Some((row.t_ns as f64 / 1e9, format!("{}->{}", row.from, row.to), row.up))
+            }
+            _ => None,
+        })
+        .collect();
+    let both = |at, up| [(at, "v1->v2".to_string(), up), (at, "v2->v1".to_string(), up)];
+    assert_eq!(changes, [both(3.0, false), both(6.0, true)].concat());
+    let ledger = emulator.ledgers().nth(1).copied().expect("v2->v1");
+    assert_eq!((ledger.of(Fate::ReceiverAbsent), ledger.dropped(), ledger.balances()), (1, 1, true));
+}
+
+#[test]
+fn a_link_may_have_an_order_and_a_queue_of_its_own() {
+    let exceptions = "[[network.exceptions]]\nfrom = \"v1\"\nto = \"v2\"\nqueue = 2\n\
+                      [[network.exceptions]]\nfrom = \"v3\"\nto = \"v2\"\norder = \"free\"";
+    let network =
+        format!("order = \"in_order\"\ndelay = {{ jittered = {{ min_s = 1.0, max_s = 5.0 }} }}\n{exceptions}");
+    let mission = mission(&network);
+    let words: Vec<(f64, u16, u32)> =
+        (0..30).flat_map(|seq| [0, 1, 2].map(move |who| (1.0 + 0.01 * f64::from(seq), who, seq))).collect();
+    let (emulator, outputs) = run(&mission, &words, 60.0);
+    let ledgers: Vec<_> = emulator.ledgers().map(|ledger| ledger.of(Fate::QueueFull)).collect();
+    assert_eq!(ledgers, [28, 0, 0, 0]);
+    let in_order = |link: usize| {
+        let number = |output: &Channel| match output {
+            Channel::Settled(settled) if settled.link == link => Some(settled.seq),
+            _ => None,
+        };
+        outputs.iter().filter_map(number).is_sorted()
+    };
+    assert_eq!([1, 2, 3].map(in_order), [true, true, false]);
 }
 
 #[test]

@@ -29,6 +29,8 @@ pub(super) struct Wire {
     duplicate: f64,
     corrupt: f64,
     in_order: bool,
+    /// Most messages under way.
+    queue: usize,
     /// Whether distances make any difference.
     pub(super) needs_distance: bool,
     /// When each message that takes a place in the queue leaves it. Kept apart from the ledger: a stepped run settles
@@ -78,6 +80,7 @@ impl Wire {
             duplicate: link.duplicate,
             corrupt: link.corrupt,
             in_order: link.in_order,
+            queue: link.queue,
             needs_distance: link.needs_distance(),
             places: BinaryHeap::new(),
             latest: Time::from_nanos(i64::MIN),
@@ -85,15 +88,8 @@ impl Wire {
     }
 
     /// Decides about message `seq` of `bits` bits, which begins at `start` and is on the air for `airtime`, over this
-    /// distance. At most `queue` messages may be under way.
-    pub(super) fn decide(
-        &mut self,
-        seq: u32,
-        bits: usize,
-        (start, airtime): (Time, Span),
-        distance: f64,
-        queue: usize,
-    ) -> Verdict {
+    /// distance.
+    pub(super) fn decide(&mut self, seq: u32, bits: usize, (start, airtime): (Time, Span), distance: f64) -> Verdict {
         let number = u64::from(seq);
         let mut first = [0.0; LANES];
         let (mut delay, mut delay_of_copy, mut lost) = (Span::ZERO, Span::ZERO, false);
@@ -120,7 +116,7 @@ impl Wire {
             Some(Fate::OutOfRange)
         } else if lost {
             Some(Fate::Lost)
-        } else if self.places.len() >= queue {
+        } else if self.places.len() >= self.queue {
             Some(Fate::QueueFull)
         } else {
             None
@@ -134,7 +130,7 @@ impl Wire {
             // Given that it is below the probability, the number is uniform up to it.
             verdict.flipped =
                 Some(((first[CORRUPT] / self.corrupt * bits as f64) as usize).min(bits.saturating_sub(1)));
-        } else if first[DUPLICATE] < self.duplicate && self.places.len() < queue {
+        } else if first[DUPLICATE] < self.duplicate && self.places.len() < self.queue {
             // A copy does not come before its original.
             let due = (start + airtime + delay_of_copy).max(due);
             self.occupy(due);

@@ -21,14 +21,20 @@ impl Hub {
         load.phase = Phase::Running;
         load.clock = Some(clock);
         load.emulator = Emulator::new(load.mission.clone(), speed_up);
+        let absent = (0..load.seats.len()).filter(|vehicle| {
+            !self.vehicles.get(&load.mission.vehicles[*vehicle].id).is_some_and(|known| known.connected)
+        });
+        let absent: Vec<usize> = if real { absent.collect() } else { Vec::new() };
         load.lockstep = (!real).then(|| Lockstep::new(&load.mission, self.window));
         let (mission, fresh) = (Opened(load.mission.clone()), !load.adopted);
         self.outputs.push_back(HubOutput::OpenLog { mission, fresh });
         if load.adopted {
             load.emulator.skip_to(now);
+            absent.into_iter().for_each(|vehicle| load.emulator.presence(now, vehicle, false));
             while load.emulator.poll_output().is_some() {}
             return;
         }
+        absent.into_iter().for_each(|vehicle| load.emulator.presence(now, vehicle, false));
         load.speeds.clear();
         let digest = load.mission.digest;
         let name = load.mission.name.clone();
@@ -126,14 +132,11 @@ impl Hub {
             match output {
                 Channel::Record(row) => self.outputs.push_back(HubOutput::Record(row)),
                 Channel::Settled(settled) => self.outputs.push_back(HubOutput::Settled(settled)),
-                Channel::Deliver { to, due, bytes } => match &mut load.lockstep {
-                    Some(lockstep) => lockstep.heard[to].0.push((due, bytes.to_vec())),
-                    None => {
-                        // Who never joined is told nothing.
-                        if let Some(seat) = load.seats[to] {
-                            self.outputs.push_back(HubOutput::Deliver(seat, bytes));
-                        }
-                    }
+                Channel::Deliver { to, due, bytes, settled } => match (&mut load.lockstep, load.seats[to]) {
+                    (Some(lockstep), _) => lockstep.heard[to].0.push((due, bytes.to_vec())),
+                    (None, Some(seat)) => self.outputs.push_back(HubOutput::Deliver { seat, bytes, settled }),
+                    // Who never joined is absent, and was dropped as such.
+                    (None, None) => self.outputs.extend(settled.map(HubOutput::Settled)),
                 },
             }
         }

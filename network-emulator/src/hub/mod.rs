@@ -72,8 +72,15 @@ pub enum HubInput {
 pub enum HubOutput {
     /// Say this to a vehicle on the mission plane.
     ToVehicle(String, ToVehicle),
-    /// Hand these bytes to the vehicle of this seat on the coordination plane.
-    Deliver(usize, Arc<[u8]>),
+    /// Hand these bytes to a vehicle on the coordination plane.
+    Deliver {
+        /// Its seat.
+        seat: usize,
+        /// The bytes.
+        bytes: Arc<[u8]>,
+        /// What to record of it, with the lateness at which it is handed over.
+        settled: Option<Settled>,
+    },
     /// Say this to mission-control, or to an operator.
     ToControl {
         /// To whom.
@@ -242,7 +249,7 @@ impl Machine for Hub {
 
     fn handle(&mut self, now: Time, input: Option<HubInput>) {
         match input {
-            Some(HubInput::Joined { id, seat }) => self.joined(id, seat),
+            Some(HubInput::Joined { id, seat }) => self.joined(now, id, seat),
             Some(HubInput::Left(id)) => self.left(now, &id),
             Some(HubInput::FromVehicle(id, message)) => self.hear_vehicle(now, &id, message),
             Some(HubInput::FromControl { who, message }) => {

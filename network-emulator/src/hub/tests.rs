@@ -247,6 +247,7 @@ fn what_is_known_of_a_flight_that_is_taken_up_is_recorded_again_and_links_were_d
     use common::record::Record;
     let command = |at_s, speed| SpeedCommand { at: Time::from_secs(at_s), speed };
     let mut hub = Hub::new();
+    ["auv1", "auv2"].iter().for_each(|id| hub.handle(Time::ZERO, Some(joined(id))));
     join(&mut hub, "auv3", Phase::Running, running(vec![command(30.0, 0.2)], 0));
     hub.handle(Time::from_secs(58.0), Some(HubInput::ClockStarted(epoch())));
     outputs(&mut hub);
@@ -286,4 +287,31 @@ fn the_status_tells_where_vehicles_said_they_are() {
     });
     let said: Vec<_> = status.expect("an answer").vehicles.into_iter().map(|vehicle| vehicle.said).collect();
     assert_eq!(said, [None, Some((made, 71.5)), None]);
+}
+
+#[test]
+fn the_channel_knows_who_has_left_and_who_is_back() {
+    use common::record::Fate;
+    use common::wire::state::CoordinationState;
+
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let say = |hub: &mut Hub, at: f64, seq: u32| {
+        let state =
+            CoordinationState { mission: digest(HELIX), sender: 0, seq, made: Time::ZERO, xi: 1.0, scalar: None };
+        hub.handle(Time::from_secs(at), Some(HubInput::State(0, state.encode().into())));
+        // 5 s of delay; the link is up for the last 2.5 s of every 10 s.
+        hub.handle(Time::from_secs(at + 5.0), None);
+        outputs(hub).into_iter().find_map(|output| match output {
+            HubOutput::Settled(settled) => Some(settled.fate),
+            HubOutput::Deliver { settled, seat: 1, .. } => settled.map(|settled| settled.fate),
+            _ => None,
+        })
+    };
+    assert_eq!(say(&mut hub, 3.0, 30), Some(Fate::Delivered));
+    hub.handle(Time::from_secs(9.0), Some(HubInput::Left("auv2".into())));
+    assert_eq!(say(&mut hub, 13.0, 130), Some(Fate::ReceiverAbsent));
+    assert_eq!(say(&mut hub, 19.0, 190), Some(Fate::LinkDown), "the link would not have carried it either");
+    hub.handle(Time::from_secs(25.0), Some(joined("auv2")));
+    assert_eq!(say(&mut hub, 33.0, 330), Some(Fate::Delivered));
 }

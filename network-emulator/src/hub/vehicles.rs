@@ -9,8 +9,8 @@ use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, Phase, SpeedComm
 use super::{Hub, HubOutput, Known, Load};
 
 impl Hub {
-    pub(super) fn joined(&mut self, id: String, seat: usize) {
-        let known = self.vehicles.entry(id).or_insert(Known {
+    pub(super) fn joined(&mut self, now: Time, id: String, seat: usize) {
+        let known = self.vehicles.entry(id.clone()).or_insert(Known {
             connected: true,
             seat,
             phase: Phase::Idle,
@@ -18,6 +18,18 @@ impl Hub {
         });
         (known.connected, known.seat) = (true, seat);
         self.take_seats();
+        self.presence(now, &id, true);
+    }
+
+    /// In real time the channel knows who can be reached.
+    fn presence(&mut self, now: Time, id: &str, present: bool) {
+        let Some(load) = self.load.as_mut().filter(|l| l.phase == Phase::Running && l.lockstep.is_none()) else {
+            return;
+        };
+        if let Some(vehicle) = load.mission.index_of(id) {
+            load.emulator.presence(now.min(load.mission.end), vehicle, present);
+            self.drain_emulator();
+        }
     }
 
     /// Notes which vehicle of the mission has which seat: a message must find its way without a look at names.
@@ -45,6 +57,7 @@ impl Hub {
         if load.lockstep.is_some() {
             self.stop(now, &format!("{id} left a stepped run, which needs every vehicle"));
         } else {
+            self.presence(now, id, false);
             self.note(now, &format!("lost the line to {id}"));
         }
     }

@@ -118,7 +118,11 @@ impl Switching {
     /// only, if there is one.
     pub fn and(self, other: Switching, only: Option<&[usize]>) -> Switching {
         let links = self.links;
-        let counts = only.map(|only| (0..links).map(|link| only.contains(&link)).collect());
+        let counts = only.map(|only| {
+            let mut counts = vec![false; links];
+            only.iter().filter(|link| **link < links).for_each(|link| counts[*link] = true);
+            counts
+        });
         let part = Part { signal: other, counts };
         let parts = match self.signal {
             Signal::All(mut parts) => {

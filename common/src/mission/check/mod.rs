@@ -88,7 +88,6 @@ fn assemble(faults: &mut Collector<'_>, file: &MissionFile, text: &str) -> Optio
         vehicles: vehicles.into_iter().collect::<Option<Vec<_>>>()?,
         links,
         switching,
-        queue: file.network.queue as usize,
         medium,
     };
     Some(mission)

@@ -57,10 +57,9 @@ pub(super) fn check(faults: &mut Collector<'_>, key: &str, loss: &LossChoice, se
         }
         LossChoice::Trace(trace) => {
             let key = format!("{key}.trace.runs");
-            let total: f64 = trace.runs.iter().map(|run| f64::from(*run)).sum();
-            let ok = (1.0..=MOST_MESSAGES).contains(&total);
-            faults.number(&key, total, ok, "runs of 1 to 1000000 messages in all");
-            if !ok {
+            let total: u64 = trace.runs.iter().map(|run| u64::from(*run)).sum();
+            if !(1..=MOST_MESSAGES as u64).contains(&total) {
+                faults.fault(&key, format!("{total} messages in all"), "runs of 1 to 1000000 messages in all");
                 return None;
             }
             let run = |(i, run): (usize, &u32)| std::iter::repeat_n(i % 2 == 1, *run as usize);

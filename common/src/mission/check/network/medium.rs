@@ -9,6 +9,9 @@ use crate::network::medium::{Slots, WhenFull};
 use crate::time::Span;
 use crate::wire::state::STATE_LIMIT;
 
+/// The least that says what a coordination message says \[bytes\]: sender, number, ξ and a checksum.
+const LEAST_PACKET: u32 = 17;
+
 /// The medium of a mission, if it has one.
 pub(in super::super) fn check_medium(
     faults: &mut Collector<'_>,
@@ -21,8 +24,12 @@ pub(in super::super) fn check_medium(
     let within = |value: f64| (0.0..=3600.0).contains(&value);
     let rate_ok = (1.0..=1e12).contains(&section.rate_bps);
     faults.number(&format!("{key}.rate_bps"), section.rate_bps, rate_ok, "1 to 1e12 bit/s");
-    if let Some(bytes) = section.packet_bytes.filter(|bytes| !(1..=65_535).contains(bytes)) {
-        faults.fault(&format!("{key}.packet_bytes"), bytes, "1 to 65535 bytes");
+    if let Some(bytes) = section.packet_bytes.filter(|bytes| !(LEAST_PACKET..=65_535).contains(bytes)) {
+        let allowed = format!(
+            "{LEAST_PACKET} to 65535 bytes: a modem that packs tightly still sends the sender (1), the number (4), ξ (8) \
+             and a checksum (4)"
+        );
+        faults.fault(&format!("{key}.packet_bytes"), bytes, allowed);
     }
     faults.number(&format!("{key}.preamble_s"), section.preamble_s, within(section.preamble_s), "0 to 3600 s");
     faults.number(&format!("{key}.backoff_s"), section.backoff_s, within(section.backoff_s), "0 to 3600 s");

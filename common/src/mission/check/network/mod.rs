@@ -6,7 +6,7 @@ mod medium;
 mod range;
 mod switching;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::super::fault::Collector;
 use super::super::file::{MissionFile, NetworkSection, OrderChoice, Preset};
@@ -57,11 +57,11 @@ pub(super) fn check_links(
     let duplicate = probability(faults, "network.duplicate_probability", network.duplicate_probability);
     let corrupt = probability(faults, "network.corrupt_probability", network.corrupt_probability);
     let in_order = network.order == Some(OrderChoice::InOrder);
-    if !(1..=1_000_000).contains(&network.queue) {
-        faults.fault("network.queue", network.queue, "1 to 1000000 messages");
-    }
+    let queue = check_queue(faults, "network.queue", network.queue);
     let lossy = loss::check(faults, "network.loss", &loss, file.seed);
     let mut links: Vec<Link> = Vec::new();
+    // A complete graph of 256 vehicles has 65,280 links: none may be looked for among all others.
+    let mut known: HashSet<(usize, usize)> = HashSet::new();
     let pairs = network.links.iter().enumerate().map(|(i, pair)| (format!("network.links[{i}]"), pair, true));
     let one_way = network.one_way.iter().enumerate().map(|(i, pair)| (format!("network.one_way[{i}]"), pair, false));
     for (key, pair, both_ways) in pairs.chain(one_way) {
@@ -70,13 +70,13 @@ pub(super) fn check_links(
             continue;
         };
         for (from, to) in [(a, b), (b, a)].into_iter().take(if both_ways { 2 } else { 1 }) {
-            if links.iter().any(|link| (link.from, link.to) == (from, to)) {
+            if !known.insert((from, to)) {
                 faults.fault(&key, format!("a second link from {} to {}", pair[0], pair[1]), "each link once");
             } else {
                 let id = |i: usize| &file.vehicles[i].id;
                 let stream = format!("link/{}->{}", id(from), id(to));
                 let layers = vec![Layer { stream, delay: delay.clone(), loss: lossy.clone() }];
-                links.push(Link { from, to, layers, range: range.clone(), duplicate, corrupt, in_order });
+                links.push(Link { from, to, layers, range: range.clone(), duplicate, corrupt, in_order, queue });
             }
         }
     }
@@ -98,10 +98,11 @@ fn check_exceptions(
     ids: &HashMap<String, usize>,
     links: &mut [Link],
 ) {
+    let places = places(links);
     for (i, exception) in network.exceptions.iter().enumerate() {
         let key = format!("network.exceptions[{i}]");
         let pair = [exception.from.clone(), exception.to.clone()];
-        let Some(link) = link_of(faults, &key, &pair, ids, links) else { continue };
+        let Some(link) = link_of(faults, &key, &pair, ids, &places) else { continue };
         let link = &mut links[link];
         if let Some(delay) = &exception.delay {
             link.layers[0].delay = delay::check(faults, &format!("{key}.delay"), delay);
@@ -119,6 +120,12 @@ fn check_exceptions(
         if exception.corrupt_probability.is_some() {
             link.corrupt = probability(faults, &format!("{key}.corrupt_probability"), exception.corrupt_probability);
         }
+        if let Some(order) = exception.order {
+            link.in_order = order == OrderChoice::InOrder;
+        }
+        if let Some(queue) = exception.queue {
+            link.queue = check_queue(faults, &format!("{key}.queue"), queue);
+        }
     }
 }
 
@@ -130,6 +137,7 @@ fn check_further(
     ids: &HashMap<String, usize>,
     links: &mut [Link],
 ) {
+    let places = places(links);
     for (i, further) in network.also.iter().enumerate() {
         let key = format!("network.also[{i}]");
         if further.delay.is_none() && further.loss.is_none() && further.switching.is_none() {
@@ -138,7 +146,7 @@ fn check_further(
         let delay = further.delay.as_ref().map(|delay| delay::check(faults, &format!("{key}.delay"), delay));
         let loss: Option<Loss> =
             further.loss.as_ref().and_then(|loss| loss::check(faults, &format!("{key}.loss"), loss, file.seed));
-        let chosen = links_of(faults, &format!("{key}.links"), further.links.as_deref(), ids, links);
+        let chosen = links_of(faults, &format!("{key}.links"), further.links.as_deref(), ids, &places);
         if delay.is_none() && loss.is_none() {
             continue;
         }
@@ -148,6 +156,13 @@ fn check_further(
             links[index].layers.push(layer);
         }
     }
+}
+
+fn check_queue(faults: &mut Collector<'_>, key: &str, queue: u32) -> usize {
+    if !(1..=1_000_000).contains(&queue) {
+        faults.fault(key, queue, "1 to 1000000 messages");
+    }
+    queue as usize
 }
 
 fn probability(faults: &mut Collector<'_>, key: &str, value: Option<f64>) -> f64 {
@@ -162,10 +177,10 @@ fn link_of(
     key: &str,
     pair: &[String; 2],
     ids: &HashMap<String, usize>,
-    links: &[Link],
+    places: &Places,
 ) -> Option<usize> {
     let (from, to) = resolve(faults, key, pair, ids)?;
-    let index = links.iter().position(|link| (link.from, link.to) == (from, to));
+    let index = places.get(&(from, to)).copied();
     if index.is_none() {
         let found = format!("{} -> {}, which is not a link", pair[0], pair[1]);
         faults.fault_of_links(key, found, "a link of network.links or network.one_way");
@@ -179,9 +194,16 @@ fn links_of(
     key: &str,
     pairs: Option<&[[String; 2]]>,
     ids: &HashMap<String, usize>,
-    links: &[Link],
+    places: &Places,
 ) -> Option<Vec<usize>> {
-    pairs.map(|pairs| pairs.iter().filter_map(|pair| link_of(faults, key, pair, ids, links)).collect())
+    pairs.map(|pairs| pairs.iter().filter_map(|pair| link_of(faults, key, pair, ids, places)).collect())
+}
+
+/// The index of each directed link (from, to).
+type Places = HashMap<(usize, usize), usize>;
+
+fn places(links: &[Link]) -> Places {
+    links.iter().enumerate().map(|(index, link)| ((link.from, link.to), index)).collect()
 }
 
 /// Groups of both directions of a link.

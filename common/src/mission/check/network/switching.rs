@@ -8,7 +8,7 @@ use super::super::super::file::{
     InMeanSwitching, IntervalSwitching, MarkovSwitching, MissionFile, NetworkSection, SwitchingChoice, SwitchingTrace,
     Together,
 };
-use super::{LONGEST, MOST_VEHICLES, link_of, links_of, pairs};
+use super::{LONGEST, MOST_VEHICLES, Places, link_of, links_of, pairs, places};
 use crate::graph::Graph;
 use crate::graph::switching::{Switching, UpInterval};
 use crate::random::Stream;
@@ -23,6 +23,7 @@ const MOST_SWITCHINGS: f64 = 200_000.0;
 struct Scope<'a> {
     ids: &'a HashMap<String, usize>,
     links: &'a [Link],
+    places: &'a Places,
     vehicles: usize,
     duration: f64,
     seed: u64,
@@ -39,12 +40,13 @@ pub(in super::super) fn check_switching(
     links: &[Link],
 ) -> Option<Switching> {
     let (vehicles, duration, seed) = (file.vehicles.len(), file.duration_s, file.seed);
-    let mut scope = Scope { ids, links, vehicles, duration, seed, stream: "switching".to_string() };
+    let places = &places(links);
+    let mut scope = Scope { ids, links, places, vehicles, duration, seed, stream: "switching".to_string() };
     let mut whole = check(faults, "network.switching", &network.switching, &scope, None);
     for (i, further) in network.also.iter().enumerate() {
         let key = format!("network.also[{i}]");
         let Some(choice) = &further.switching else { continue };
-        let only = links_of(faults, &format!("{key}.links"), further.links.as_deref(), ids, links);
+        let only = links_of(faults, &format!("{key}.links"), further.links.as_deref(), ids, places);
         scope.stream = format!("switching/also[{i}]");
         let signal = check(faults, &format!("{key}.switching"), choice, &scope, only.as_deref());
         whole = whole.zip(signal).map(|(whole, signal)| whole.and(signal, only.as_deref()));
@@ -117,7 +119,7 @@ fn check_intervals(
     for (i, interval) in choice.up.iter().enumerate() {
         let key = format!("{key}.up[{i}]");
         check_interval(faults, &format!("{key}.from_s"), &format!("{key}.to_s"), interval.from_s, interval.to_s);
-        let links = links_of(faults, &format!("{key}.links"), interval.links.as_deref(), scope.ids, scope.links);
+        let links = links_of(faults, &format!("{key}.links"), interval.links.as_deref(), scope.ids, scope.places);
         up.push(UpInterval { from: Time::from_secs(interval.from_s), to: Time::from_secs(interval.to_s), links });
     }
     if choice.up.is_empty() {
@@ -212,7 +214,7 @@ fn check_trace(
     for (i, link) in trace.links.iter().enumerate() {
         let key = format!("{key}.links[{i}]");
         let pair = [link.from.clone(), link.to.clone()];
-        let Some(index) = link_of(faults, &key, &pair, scope.ids, scope.links) else { continue };
+        let Some(index) = link_of(faults, &key, &pair, scope.ids, scope.places) else { continue };
         if std::mem::replace(&mut told[index], true) {
             faults.fault(&key, format!("{} -> {} a second time", pair[0], pair[1]), "each link once");
         }

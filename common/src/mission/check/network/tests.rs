@@ -68,7 +68,7 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "2",
             "10",
         ),
-        ("loss = { trace = { runs = [] } }", "loss.trace.runs", "0", "1 to 1000000"),
+        ("loss = { trace = { runs = [] } }", "loss.trace.runs", "found 0 messages", "1 to 1000000"),
         ("range = { disc = { radius_m = 0.0 } }", "range.disc.radius_m", "0", "above 0"),
         ("range = { curve = { points = [[5.0, 1.0], [5.0, 0.5]] } }", "range.curve.points[1]", "5", "greater"),
         ("range = { curve = { points = [[5.0, 1.5]] } }", "range.curve.points[0]", "1.5", "0 to 1"),
@@ -97,6 +97,13 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "every directed link",
         ),
         ("medium = { rate_bps = 0.0 }", "medium.rate_bps", "0", "1 to 1e12"),
+        ("medium = { rate_bps = 80.0, packet_bytes = 16 }", "medium.packet_bytes", "16", "17 to 65535 bytes: a modem"),
+        (
+            "exceptions = [{ from = \"auv1\", to = \"auv2\", queue = 0 }]",
+            "exceptions[0].queue",
+            "0",
+            "1 to 1000000 messages",
+        ),
         ("medium = { rate_bps = 80.0, queue = 0 }", "medium.queue", "0", "1 to 10000"),
         ("medium = { rate_bps = 80.0, duty_cycle = 1.5 }", "medium.duty_cycle", "1.5", "a share of the time"),
         (

@@ -57,7 +57,7 @@ pub struct SharedFades {
 /// Losses as recorded.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct LossTrace {
-    /// Lengths of runs of messages, by turns: arriving, lost, arriving, lost, …
+    /// Lengths of runs of message periods, by turns: arriving, lost, arriving, lost, …
     pub runs: Vec<u32>,
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct MediumSection {
     /// Bits that a sender puts on the air per second (bit/s).
     pub rate_bps: f64,
-    /// Size of a message on the air (bytes), as a modem would pack it; its own size if absent.
+    /// Size of a message on the air (bytes), as a modem would pack it, 17 to 65535; its own size if absent.
     pub packet_bytes: Option<u32>,
     /// Time on the air before the first bit of each message (s).
     #[serde(default)]

@@ -97,6 +97,10 @@ pub struct LinkException {
     pub duplicate_probability: Option<f64>,
     /// Its probability of a flipped bit, if other than the network's.
     pub corrupt_probability: Option<f64>,
+    /// Whether messages may overtake one another on it, if other than the network's.
+    pub order: Option<OrderChoice>,
+    /// Most messages under way on it, 1 to 1000000, if other than the network's.
+    pub queue: Option<u32>,
 }
 
 /// Further models: delays add up, a message is lost if any model loses it, a link is up while all signals have it up.
