@@ -167,7 +167,8 @@ mod tests {
         let write = |envelope| {
             let said = |_: &Summary| Theory { rows: Vec::new(), envelope };
             let (facts, account) = (facts(true), Account::default());
-            let (summary, _) = write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");
+            let (summary, _) =
+                write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");
             let drawn = fs::read_to_string(directory.path().join("figures/rate.svg")).expect("reads");
             (summary.fleet.coordination.at_least_guaranteed, drawn.contains("guaranteed: 0.020 /s"))
         };
