@@ -42,6 +42,9 @@ pub enum FlightOutput {
 /// Control periods between two rows about deadlines.
 const TICKS_PER_REPORT: u64 = 200;
 
+/// A vehicle whose law has had no answer for so many control periods in a row gives up.
+const MOST_UNANSWERED: u64 = 100;
+
 /// One flight of one vehicle.
 pub struct Flight {
     mission: Arc<Mission>,
@@ -61,6 +64,9 @@ pub struct Flight {
     next_message: i64,
     next_row: i64,
     over: bool,
+    /// Commands without an answer so far, and how many of them the last ones were.
+    refused: u64,
+    unanswered: u64,
     /// Waits for the first neighbour to place its virtual target (a vehicle that comes back).
     rejoining: bool,
     /// Deadlines since the last report; only with a real clock.
@@ -125,6 +131,8 @@ impl Flight {
             next_message: 0,
             next_row: 0,
             over: false,
+            refused: 0,
+            unanswered: 0,
             rejoining: false,
             deadlines: speed_up.map(|_| Deadlines::default()),
             speed_up: speed_up.unwrap_or(1.0),
@@ -234,6 +242,10 @@ impl Flight {
         let demand = self.law.demand(reference, &own, present);
         let heard = present.len() as u16;
         self.craft.command(reference, demand);
+        if self.is_past_help() {
+            self.fail(t, "its law has no answer any more");
+            return;
+        }
 
         // The number of a message follows from the time, so that it grows across a restart; a message that fell into
         // missed control periods is sent late rather than not at all.
@@ -257,6 +269,14 @@ impl Flight {
             }
             self.outputs.push_back(FlightOutput::Record(Row::Exact(Record::State(row))));
         }
+    }
+
+    /// Whether the last command before the law fell silent has been held for too long.
+    fn is_past_help(&mut self) -> bool {
+        let refused = self.craft.refused();
+        self.unanswered = if refused > self.refused { self.unanswered + 1 } else { 0 };
+        self.refused = refused;
+        self.unanswered >= MOST_UNANSWERED
     }
 
     /// Puts the coordination state on the air; false if it is not a number.
@@ -520,6 +540,27 @@ mod tests {
         let [(at, row)] = &warnings[..] else { panic!("one warning, not {warnings:?}") };
         assert_eq!((at.secs(), row.t_ns, &*row.source), (2.0, 2_000_000_000, "auv1"));
         assert!(row.text.contains("at its limit") && row.count > 30, "{row:?}");
+    }
+
+    #[test]
+    fn a_vehicle_whose_law_has_no_answer_any_more_gives_up() {
+        let text = include_str!("../../missions/thesis/fig-3-7.toml").replacen("speed = 0.1\n", "speed = 1e6\n", 1);
+        let mission = Arc::new(Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")));
+        let failures: Vec<(f64, String)> = (0..3)
+            .filter_map(|me| {
+                let mut flight = Flight::new(mission.clone(), me, None).expect("flies");
+                let mut failed = None;
+                flight.run_until(mission.end, [], |at, output| {
+                    if let FlightOutput::Failed(reason) = output {
+                        failed = Some((at.secs(), reason));
+                    }
+                });
+                failed
+            })
+            .collect();
+        // A state that is no number may come first.
+        assert!(failures.len() == 3 && failures.iter().all(|(at, _)| *at < 5.0), "{failures:?}");
+        assert!(failures.iter().any(|(_, reason)| reason.contains("no answer any more")), "{failures:?}");
     }
 
     #[test]

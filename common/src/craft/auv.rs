@@ -196,6 +196,10 @@ impl Craft for AuvCraft {
         self.state.is_finite() && self.gamma.is_finite() && self.eta.is_finite()
     }
 
+    fn refused(&self) -> u64 {
+        self.refused
+    }
+
     fn warnings(&self) -> Vec<Warning> {
         [(LIMITED, self.limited), (SATURATED, self.saturated), (REFUSED, self.refused)]
             .map(|(what, count)| Warning { what, count })

@@ -286,6 +286,10 @@ impl Craft for MarineCraft {
         self.xi.is_finite() && self.held.is_finite() && self.state.to_vector().iter().all(|x| x.is_finite())
     }
 
+    fn refused(&self) -> u64 {
+        self.refused
+    }
+
     fn warnings(&self) -> Vec<Warning> {
         let counts = [(SATURATED, self.saturated), (SINGULAR, self.singular), (REFUSED, self.refused)];
         counts.map(|(what, count)| Warning { what, count }).to_vec()

@@ -119,6 +119,10 @@ pub trait Craft: Send {
     fn place_target(&mut self, xi: f64);
     /// True while every state is finite.
     fn is_sound(&self) -> bool;
+    /// How many commands had no answer so far, and left the one before in force: the count of [`REFUSED`].
+    fn refused(&self) -> u64 {
+        0
+    }
     /// What happened so far that a flight should not hide; counts of zero may be left out.
     fn warnings(&self) -> Vec<Warning> {
         Vec::new()

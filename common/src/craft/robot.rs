@@ -304,6 +304,10 @@ impl Craft for RobotCraft {
         self.xi.is_finite() && self.held.is_finite() && self.state.to_vector().iter().all(|x| x.is_finite())
     }
 
+    fn refused(&self) -> u64 {
+        self.refused
+    }
+
     fn warnings(&self) -> Vec<Warning> {
         vec![Warning { what: SATURATED, count: self.saturated }, Warning { what: REFUSED, count: self.refused }]
     }

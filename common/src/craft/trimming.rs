@@ -220,6 +220,10 @@ impl Craft for TrimmingCraft {
             && self.state.to_vector().iter().all(|x| x.is_finite())
     }
 
+    fn refused(&self) -> u64 {
+        self.refused
+    }
+
     fn warnings(&self) -> Vec<Warning> {
         vec![
             Warning { what: LIMITED, count: self.near_singular },

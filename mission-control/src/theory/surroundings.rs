@@ -1,10 +1,10 @@
 //! What statements ask for beyond their network, looked at in one place: how R_i goes along the way, that v_L is constant and not
 //! zero, and that nothing disturbs.
 //!
-//! *Undisturbed* means: no current, no noise, no failure, and no actuator at its limit. Whether limits are reached is known
-//! after the flight; before it, only that a path turns faster than its vehicle can.
+//! *Undisturbed* means: no current, no noise, no failure, no actuator at its limit, and an answer of the law at all times. Whether limits
+//! are reached is known after the flight; before it, only that a path turns faster than its vehicle can.
 
-use common::craft::SATURATED;
+use common::craft::{REFUSED, SATURATED};
 use common::mission::{Mission, VehiclePlan};
 use common::theory::proposition_3_4::PathRates;
 use common::time::Time;
@@ -127,8 +127,8 @@ impl Disturbances {
             let limits = vehicle.limits;
             [limits.force, limits.torque, limits.acceleration, limits.turn_rate].iter().any(|limit| limit.is_finite())
         };
-        let saturated = |_: usize, vehicle: &VehiclePlan| {
-            let begin = format!("{}: {SATURATED}", vehicle.id);
+        let warned_of = |what: &str, vehicle: &VehiclePlan| {
+            let begin = format!("{}: {what}", vehicle.id);
             summary.is_some_and(|summary| summary.warnings.iter().any(|warning| warning.starts_with(&begin)))
         };
         Disturbances {
@@ -138,7 +138,8 @@ impl Disturbances {
                 whose("a path that turns faster than the limit", &|index, vehicle| {
                     vehicle.limits.turn_rate < turning(mission, index)
                 }),
-                whose(SATURATED, &saturated),
+                whose(SATURATED, &|_, vehicle| warned_of(SATURATED, vehicle)),
+                whose(REFUSED, &|_, vehicle| warned_of(REFUSED, vehicle)),
             ]
             .into_iter()
             .flatten()
