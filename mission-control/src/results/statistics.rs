@@ -220,7 +220,7 @@ mod tests {
     fn only_the_part_on_the_paths_counts() {
         // e' = −0.4e + d with d = e^(−t): at first the error follows d, later it decays at its own rate.
         let d = |t: f64| (-t).exp();
-        let e = |t: f64| (d(t) * -1.0 + 1.2 * (-0.4 * t).exp()) / 0.6;
+        let e = |t: f64| (1.2 * (-0.4 * t).exp() - d(t)) / 0.6;
         let (times, norms) = series(|t| e(t).max(1e-12));
         let disturbance: Vec<f64> = times.iter().map(|t| d(*t)).collect();
         let fit = fit_coordination(&times, &norms, Some(&disturbance), 0.0, None).expect("decays");

@@ -207,6 +207,7 @@ fn add(cell: &mut String, words: &str) {
 
 /// When v_L changes for the last time, if it does under way.
 pub(super) fn last_step(mission: &Mission) -> Option<Time> {
-    let steps = mission.speed.steps().windows(2).filter(|pair| pair[0].speed != pair[1].speed).map(|pair| pair[1].at);
-    steps.filter(|at| (Time::ZERO..mission.end).contains(at) && *at > Time::ZERO).next_back()
+    let mut steps =
+        mission.speed.steps().windows(2).filter(|pair| pair[0].speed != pair[1].speed).map(|pair| pair[1].at);
+    steps.rfind(|at| (Time::ZERO..mission.end).contains(at) && *at > Time::ZERO)
 }
