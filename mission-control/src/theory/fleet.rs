@@ -201,14 +201,17 @@ pub(super) fn bias(case: &Case<'_>) -> Option<TheoryRow> {
     let bias = mission.predicted_along_bias(first)?;
     let margins = (0..mission.vehicles.len()).filter_map(|i| mission.rank_margin(i));
     let tightest = margins.min_by(|(a, b), (c, d)| (a - b).total_cmp(&(c - d)));
-    let holds = case.disturbances.is_empty() && tightest.is_some_and(|(size, least)| size > least);
+    // At another rate than v_n it is another one (docs/errata.md, result iv).
+    let nominal = !has_type_1(mission) && mission.excited_speed().is_none();
+    let holds = nominal && case.disturbances.is_empty() && tightest.is_some_and(|(size, least)| size > least);
     Some(TheoryRow {
         name: "Along-path bias left by δ (Theorem 4.7, erratum 4.12)".into(),
-        condition: "δ₁ < 0, |δ₁| > |v_n| |p'| max|m_ii − m₁₁|/m₁₁, so that the matrix B keeps its rank; undisturbed"
+        condition: "δ₁ < 0, |δ₁| > |v_n| |p'| max|m_ii − m₁₁|/m₁₁, so that the matrix B keeps its rank; targets that go at v_n; undisturbed"
             .into(),
         value: format!(
-            "{}{}",
+            "{}{}{}",
             tightest.map_or("–".into(), |(size, least)| format!("|δ₁| = {size} > {least:.4} m/s")),
+            if nominal { "" } else { "; α₂ keeps targets at another rate (erratum 4.14)" },
             if case.disturbances.is_empty() { "" } else { "; disturbed" }
         ),
         holds: Some(holds),
