@@ -118,14 +118,17 @@ mod tests {
 
     #[test]
     fn losses_of_two_links_are_as_correlated_as_told() {
-        let n = 200_000;
+        let (n, share, burst) = (200_000, 0.3, 3.0);
+        // With z = (x − p)/√(pq), the estimate is the mean of products z_a z_b: each has a variance of at most E z⁴ = 1/pq − 3,
+        // and k messages apart they are correlated by at most ρ^k, ρ = 1 − 1/burst − 1/gap.
+        let (variance, gap) = (share * (1.0 - share), burst * (1.0 - share) / share);
+        let rho = 1.0 - 1.0 / burst - 1.0 / gap;
+        let bound = 5.0 * ((1.0 / variance - 3.0) * (1.0 + rho) / (1.0 - rho) / n as f64).sqrt();
         for correlation in [0.0, 0.5, 1.0] {
-            let loss = shared(0.3, 3.0, correlation);
+            let loss = shared(share, burst, correlation);
             let (a, b) = (lost(&loss, "a", n), lost(&loss, "b", n));
             let both = mean(&a.iter().zip(&b).map(|(a, b)| a * b).collect::<Vec<_>>());
-            let found = (both - mean(&a) * mean(&b)) / (0.3 * 0.7);
-            // The standard deviation of a correlation of n pairs is at most about 1/√n, more with bursts.
-            let bound = 5.0 * (2.0 * 3.0 / n as f64).sqrt();
+            let found = (both - mean(&a) * mean(&b)) / variance;
             assert!((found - correlation * correlation).abs() < bound, "{found} for {}", correlation * correlation);
         }
     }

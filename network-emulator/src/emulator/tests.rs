@@ -317,7 +317,7 @@ fn a_second_copy_is_delivered_and_has_a_ledger_of_its_own() {
 fn a_corrupt_message_is_handed_over_with_one_bit_flipped_and_counts_as_dropped() {
     let mission = mission("corrupt_probability = 0.5");
     let mut emulator = Emulator::new(mission.clone(), None);
-    let (n, mut flipped, mut bits) = (2000, 0, std::collections::BTreeSet::new());
+    let (n, mut flipped, mut hits) = (20_000, 0, vec![0u32; 8 * state(&mission, 0, 0).len()]);
     for seq in 0..n {
         let now = seconds(f64::from(seq) * 0.01);
         let good = state(&mission, 0, seq);
@@ -332,14 +332,16 @@ fn a_corrupt_message_is_handed_over_with_one_bit_flipped_and_counts_as_dropped()
                 assert!(CoordinationState::decode(&bytes).is_err(), "the receiver notices bit {different:?}");
             }
             flipped += different.len() as u64;
-            bits.extend(different);
+            different.into_iter().for_each(|bit| hits[bit] += 1);
         }
     }
     let ledger = emulator.ledgers().next().copied().expect("a link");
     assert_eq!((ledger.of(Fate::Corrupt), ledger.dropped()), (flipped, flipped));
     assert!((flipped as f64 / f64::from(n) - 0.5).abs() < 5.0 * 0.5 / f64::from(n).sqrt(), "{flipped} of {n}");
-    // About a thousand flips over fewer than 400 bits: nearly every bit was hit.
-    assert!(bits.len() > 200, "{} different bits", bits.len());
+    // Every bit alike: χ² over B bits has mean B − 1 and variance 2(B − 1).
+    let (each, freedom) = (flipped as f64 / hits.len() as f64, hits.len() as f64 - 1.0);
+    let chi_squared: f64 = hits.iter().map(|&count| (f64::from(count) - each).powi(2) / each).sum();
+    assert!((chi_squared - freedom).abs() < 5.0 * (2.0 * freedom).sqrt(), "{chi_squared} for {freedom}");
 }
 
 /// v1, v2 and v3 in a row over a shared medium where a message takes 1 s on the air.
