@@ -281,6 +281,10 @@ impl VehicleNode {
 
     /// Stepped clock: runs every control period up to `until`, then says so.
     fn grant(&mut self, until: Time, heard: Vec<(Time, Vec<u8>)>, speeds: Vec<SpeedCommand>) {
+        if self.phase == Phase::Aborted {
+            // Who gave up does not keep the others waiting.
+            return self.send(FromVehicle::Reached { until, sent: Vec::new() });
+        }
         let Some(flight) = self.load.as_mut().and_then(|load| load.flight.as_mut()) else { return };
         if self.phase != Phase::Running {
             return;

@@ -104,6 +104,11 @@ impl Hub {
         for (at, from, bytes) in lockstep.take_sent() {
             load.emulator.handle(at, Some(Sent { from, bytes: bytes.into() }));
         }
+        let is_out = |id: &&str| self.vehicles.get(*id).is_some_and(|known| known.phase == Phase::Aborted);
+        if let Some(id) = load.mission.vehicles.iter().map(|vehicle| vehicle.id.as_str()).find(is_out) {
+            let why = format!("{id} aborted a stepped run, which needs every vehicle");
+            return self.stop(until, &why);
+        }
         if until < load.mission.end {
             self.grant();
         } else {

@@ -90,14 +90,15 @@ impl Hub {
         }
     }
 
-    /// A vehicle cannot go on: the others do if time is real, until none is left.
+    /// A vehicle cannot go on: the others do if time is real, until none is left. In lock step all run what was granted first,
+    /// lest it depend on their haste who is heard of ([`Hub::reached`]).
     fn aborted(&mut self, now: Time, id: &str, reason: &str) {
         let Some(load) = self.load.as_ref().filter(|load| load.phase == Phase::Running) else { return };
         if load.mission.index_of(id).is_none() {
             return;
         }
         if load.lockstep.is_some() {
-            return self.stop(now, &format!("{id} aborted a stepped run, which needs every vehicle"));
+            return;
         }
         let is_out = |id: &str| self.vehicles.get(id).is_some_and(|known| known.phase == Phase::Aborted);
         let nobody_flies = load.mission.vehicles.iter().all(|vehicle| is_out(&vehicle.id));
