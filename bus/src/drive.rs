@@ -169,13 +169,20 @@ impl<P: Port> Program<P> {
         Program { machine, port, clock, exit: None, awake_at: Instant::now() }
     }
 
-    /// What happened at a moment is decided and carried out, and so is what is due by now. True if the loop sleeps for
-    /// longer than the machine wants, and must be woken.
+    /// What happened at a moment is decided and carried out, one after the other, and so is what is due by now. True if the
+    /// loop sleeps for longer than the machine wants, and must be woken.
     ///
-    /// For who holds the program outside its loop: a message that arrives needs no thread to be woken for it.
-    pub fn at_once(&mut self, at: Instant, input: Input<P>) -> bool {
-        self.machine.handle(self.clock.time_at(at), Some(input));
-        self.carry_out();
+    /// For who holds the program outside its loop: messages that arrive need no thread to be woken for them.
+    pub fn at_once(&mut self, at: Instant, inputs: impl Iterator<Item = Input<P>>) -> bool {
+        let now = self.clock.time_at(at);
+        for input in inputs {
+            self.machine.handle(now, Some(input));
+            self.carry_out();
+            if self.machine.poll_timeout().is_some_and(|time| time <= now) {
+                self.machine.handle(now, None);
+                self.carry_out();
+            }
+        }
         self.meet_deadline();
         self.exit.is_some() || self.deadline().is_some_and(|deadline| deadline < self.awake_at)
     }
@@ -253,7 +260,12 @@ impl<P: Port> Shared<P> {
 
     /// Holds it if that takes no waiting, and nobody waits.
     pub fn try_hold(&self) -> Option<MutexGuard<'_, Program<P>>> {
-        if self.wanted.load(Ordering::Relaxed) { None } else { self.program.try_lock().ok() }
+        if self.is_wanted() { None } else { self.program.try_lock().ok() }
+    }
+
+    /// Whether the loop waits for who holds it.
+    pub fn is_wanted(&self) -> bool {
+        self.wanted.load(Ordering::Relaxed)
     }
 
     /// The program's port, when its loop has ended.

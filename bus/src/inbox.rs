@@ -4,17 +4,42 @@
 //! counted. A gate is shut until the two ends have shaken hands, and again when the line is lost, so that a program
 //! sees every packet after the line's beginning and before its end.
 
+use std::fmt;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use crate::counts::Tally;
 use crate::outbox::{ACK_EVERY, Outbox, STATE_ACK_EVERY};
-use crate::plane::{Assembled, Assembly, BUNDLE, Frame, Plane, cost, unbundle};
+use crate::plane::{Assembled, Assembly, BUNDLE, Frame, Plane, Size, cost, state_cost, unbundle};
 use crate::queue::{Feed, Refused};
 
-/// Who may take a state-plane packet at once, on the transport's thread; true if it was taken.
-pub(crate) type Shortcut = dyn Fn(Instant, &[u8]) -> bool + Send + Sync;
+/// Who may take state-plane messages at once, on the transport's thread: as many as it likes, beginning with the first.
+pub(crate) type Shortcut = dyn Fn(Instant, &mut Messages<'_>) + Send + Sync;
+
+/// The state-plane messages that have arrived together. Each is counted before it is taken, so that a program never finds a
+/// count behind what it holds.
+pub struct Messages<'a> {
+    bytes: &'a [u8],
+    tally: &'a Tally,
+}
+
+impl<'a> Iterator for Messages<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let (message, rest) = unbundle(self.bytes)?;
+        self.bytes = rest;
+        self.tally.state_in.add(1);
+        Some(message)
+    }
+}
+
+impl fmt::Debug for Messages<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Messages").field(&Size(self.bytes.len())).finish()
+    }
+}
 
 /// One end of a line, receiving: `E` is the program's event.
 pub(crate) struct Inbox<E> {
@@ -25,7 +50,7 @@ pub(crate) struct Inbox<E> {
     shortcut: OnceLock<Box<Shortcut>>,
     phase: AtomicU8,
     gate: Mutex<Gate>,
-    /// What has arrived on the state plane, as [`cost`] counts, and how much of it was acknowledged.
+    /// What has arrived on the state plane, as [`state_cost`] counts, and how much of it was acknowledged.
     states_taken: AtomicU64,
     states_acknowledged: AtomicU64,
     tally: Arc<Tally>,
@@ -126,32 +151,26 @@ impl<E> Inbox<E> {
     pub(crate) fn on_state(&self, bytes: &[u8]) {
         self.take_states(bytes);
         // Taken or not, it takes no more room on the way here.
-        let taken = self.states_taken.fetch_add(cost(bytes), Ordering::Relaxed) + cost(bytes);
+        let cost = state_cost(bytes);
+        let taken = self.states_taken.fetch_add(cost, Ordering::Relaxed) + cost;
         if taken - self.states_acknowledged.load(Ordering::Relaxed).min(taken) >= STATE_ACK_EVERY {
             self.states_acknowledged.store(taken, Ordering::Relaxed);
             self.outbox.acknowledge(&Frame::StatesTaken { taken });
         }
     }
 
-    fn take_states(&self, mut bytes: &[u8]) {
+    fn take_states(&self, bytes: &[u8]) {
         let at = Instant::now();
         if bytes.len() > BUNDLE + Plane::State.limit() {
             self.tally.oversized.add_one();
             return;
         }
-        // Not under the lock: who takes it may send on this very line.
-        while let Some(shortcut) = self.shortcut.get()
-            && self.is_open()
-            && let Some((message, rest)) = unbundle(bytes)
-        {
-            self.tally.state_in.add(1);
-            if !shortcut(at, message) {
-                self.tally.state_in.take_back(1);
-                break;
-            }
-            bytes = rest;
+        let mut messages = Messages { bytes, tally: &self.tally };
+        // Not under the lock: who takes them may send on this very line.
+        if let Some(shortcut) = self.shortcut.get().filter(|_| self.is_open()) {
+            shortcut(at, &mut messages);
         }
-        if bytes.is_empty() {
+        if messages.bytes.is_empty() {
             return;
         }
         let _gate = self.lock();
@@ -159,18 +178,15 @@ impl<E> Inbox<E> {
             return;
         }
         let mut came = 0;
-        let messages = std::iter::from_fn(|| {
-            let (message, rest) = unbundle(bytes)?;
-            bytes = rest;
+        let packets = messages.by_ref().map(|message| {
             came += 1;
-            // Before the program can see the message, so that it never finds a count behind what it holds.
-            self.tally.state_in.add(1);
-            Some((self.packet)(Plane::State, at, message.to_vec()))
+            (self.packet)(Plane::State, at, message.to_vec())
         });
-        if !self.events.droppable(messages, &*self.dropped) {
+        if !self.events.droppable(packets, &*self.dropped) {
             self.tally.state_in.take_back(came);
+            return;
         }
-        if !bytes.is_empty() {
+        if !messages.bytes.is_empty() {
             self.tally.garbage.add_one();
         }
     }

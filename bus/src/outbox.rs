@@ -17,18 +17,21 @@ use zenoh::{Session, Wait};
 
 use crate::counts::Tally;
 use crate::error::{Error, Result};
-use crate::plane::{BUNDLE, Frame, Plane, bundle, cost, frames};
+use crate::plane::{BUNDLE, Frame, LEAST_STATE_COST, Plane, bundle, cost, frames, state_cost};
 
 /// How much of the mission plane may be on its way.
 const WINDOW: u64 = 256 << 10;
 /// The other end acknowledges this often: what it has not acknowledged yet leaves room for the largest frame.
 pub(crate) const ACK_EVERY: u64 = WINDOW / 4;
-/// How much of the state plane may be on its way.
-const STATE_WINDOW: u64 = 512 << 10;
+/// How much of the state plane may be on its way: 512 KiB, and no more than 32 bundles.
+const STATE_WINDOW: u64 = 32 * LEAST_STATE_COST;
 /// The other end acknowledges this often.
-pub(crate) const STATE_ACK_EVERY: u64 = STATE_WINDOW / 8;
+pub(crate) const STATE_ACK_EVERY: u64 = STATE_WINDOW / 4;
 /// The most of the state plane that waits here: about a thousand messages, for what is older helps nobody.
 const STATE_BACKLOG: usize = 2 * BUNDLE;
+/// Messages that wait are put together up to this size: half a hundred that travel as one cost the transport as much as one,
+/// and no more than these are dropped together.
+const TOGETHER: usize = 2 << 10;
 /// The most that waits for one line.
 const BACKLOG_LIMIT: usize = 64 << 20;
 
@@ -63,15 +66,27 @@ struct States {
     waiting: VecDeque<(Vec<u8>, u64)>,
     waiting_bytes: usize,
     closed: bool,
-    /// Totals since the line was opened, as [`cost`] counts.
+    /// Totals since the line was opened, as [`state_cost`] counts.
     sent: u64,
     taken: u64,
 }
 
 impl States {
+    /// A bundle waits for its turn, if possible with what came last.
+    fn wait(&mut self, bundle: Vec<u8>, messages: u64) {
+        self.waiting_bytes += bundle.len();
+        match self.waiting.back_mut() {
+            Some((last, so_far)) if last.len() + bundle.len() <= TOGETHER => {
+                last.extend_from_slice(&bundle);
+                *so_far += messages;
+            }
+            _ => self.waiting.push_back((bundle, messages)),
+        }
+    }
+
     /// The oldest bundle, if there is room for it on its way.
     fn next(&mut self) -> Option<(Vec<u8>, u64)> {
-        let cost = cost(&self.waiting.front()?.0);
+        let cost = state_cost(&self.waiting.front()?.0);
         if self.sent.saturating_sub(self.taken) + cost > STATE_WINDOW {
             return None;
         }
@@ -163,21 +178,26 @@ impl Outbox {
             self.tally.state_unsent.add(messages);
             return Err(Error::NotConnected);
         }
-        states.waiting_bytes += bundle.len();
-        states.waiting.push_back((bundle, messages));
+        states.wait(bundle, messages);
         self.send_states(&mut states)
     }
 
     /// Gives the transport what may go, under the lock, so that the order is kept; what is too much is dropped.
     fn send_states(&self, states: &mut States) -> Result<()> {
         while let Some((bundle, messages)) = states.next() {
-            if self.state.put(bundle).wait().is_err() {
-                self.tally.state_unsent.add(messages);
-                return Err(Error::NotConnected);
-            }
-            self.tally.state_out.add(messages);
+            self.put(bundle, messages)?;
         }
         self.tally.state_unsent.add(states.shorten(STATE_BACKLOG));
+        Ok(())
+    }
+
+    /// Gives the transport a bundle of states.
+    fn put(&self, bundle: Vec<u8>, messages: u64) -> Result<()> {
+        if self.state.put(bundle).wait().is_err() {
+            self.tally.state_unsent.add(messages);
+            return Err(Error::NotConnected);
+        }
+        self.tally.state_out.add(messages);
         Ok(())
     }
 
@@ -211,8 +231,14 @@ impl Outbox {
         }
     }
 
-    /// Has the other end say what it has taken, once it has taken all that was sent before.
+    /// Has the other end say what it has taken, once it has taken all that was sent before: also the states that wait, for
+    /// which the transport's queue has room, but for no more after them.
     pub(crate) fn ask_to_acknowledge(&self) -> Result<()> {
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        while let Some((bundle, messages)) = states.pop() {
+            self.put(bundle, messages)?;
+        }
+        drop(states);
         self.send_frame(&Frame::AckNow)
     }
 
@@ -281,28 +307,29 @@ mod tests {
         /// and the rest goes in order.
         #[test]
         fn the_oldest_states_make_place_and_every_message_is_accounted_for(
-            steps in prop::collection::vec((1usize..40_000, any::<bool>()), 1..200)
+            steps in prop::collection::vec((prop_oneof![1usize..40, 1usize..5_000], any::<bool>()), 1..400)
         ) {
             let mut states = States::default();
-            let (mut sent, mut dropped) = (Vec::new(), 0);
-            for (number, (size, takes)) in (1u64..).zip(&steps) {
-                states.waiting_bytes += size;
-                // The number of messages tells the bundles apart.
-                states.waiting.push_back((vec![0; *size], number));
+            let (mut sent, mut counted, mut dropped) = (Vec::new(), 0, 0);
+            for (number, (times, takes)) in (0u64..).zip(&steps) {
+                states.wait(number.to_le_bytes().repeat(*times), 1);
                 if *takes {
                     states.taken = states.sent;
                 }
-                while let Some((_, messages)) = states.next() {
-                    sent.push(messages);
+                while let Some((bundle, messages)) = states.next() {
+                    sent.extend(bundle.chunks(8).map(|number| u64::from_le_bytes(number.try_into().expect("eight"))));
+                    counted += messages;
                 }
                 dropped += states.shorten(STATE_BACKLOG);
                 prop_assert!(states.sent - states.taken <= STATE_WINDOW);
-                prop_assert!(states.waiting.iter().map(|(bundle, _)| bundle.len()).sum::<usize>() <= STATE_BACKLOG);
+                let waiting = states.waiting.iter().map(|(bundle, _)| bundle.len()).sum::<usize>();
+                prop_assert!(waiting <= STATE_BACKLOG && waiting == states.waiting_bytes);
             }
             prop_assert!(sent.is_sorted());
+            sent.dedup();
+            prop_assert_eq!(sent.len() as u64, counted);
             let waiting: u64 = states.waiting.iter().map(|(_, messages)| messages).sum();
-            let all: u64 = (1..=steps.len() as u64).sum();
-            prop_assert_eq!(sent.iter().sum::<u64>() + dropped + waiting, all);
+            prop_assert_eq!(counted + dropped + waiting, steps.len() as u64);
             if steps.iter().all(|(_, takes)| *takes) {
                 prop_assert_eq!(dropped, 0, "who keeps up loses nothing");
             }

@@ -192,10 +192,20 @@ pub(crate) fn unbundle(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     rest.split_at_checked(length)
 }
 
-/// What a frame costs in the transport's queue: itself and a generous header \[bytes\].
+/// What a frame of the mission plane costs in the transport's queue: itself and a generous header \[bytes\].
 pub(crate) fn cost(frame: &[u8]) -> u64 {
     frame.len() as u64 + 64
 }
+
+/// What a bundle of the state plane is reckoned to cost there \[bytes\]: also a small one so much that few may be on their
+/// way at once. Of messages in a steady exchange there never are; in a flood, those that wait for their turn travel together,
+/// which costs the transport far less than each by itself.
+pub(crate) fn state_cost(bundle: &[u8]) -> u64 {
+    cost(bundle).max(LEAST_STATE_COST)
+}
+
+/// See [`state_cost`].
+pub(crate) const LEAST_STATE_COST: u64 = 16 << 10;
 
 /// Puts one message together out of its parts; what does not continue it is garbage.
 #[derive(Debug, Default)]

@@ -17,6 +17,7 @@ use zenoh::{Session, Wait};
 
 use crate::counts::{Counts, Tally};
 use crate::error::{Error, Result};
+pub use crate::inbox::Messages;
 use crate::inbox::{Handshake, Inbox};
 use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
 use crate::outbox::Outbox;
@@ -120,8 +121,8 @@ pub struct Switchboard {
     addressed: Vec<LineId>,
 }
 
-/// Who may take a state-plane packet at once, on the transport's thread; true if it was taken.
-pub type Shortcut = dyn Fn(LineId, Instant, &[u8]) -> bool + Send + Sync;
+/// Who may take a line's state-plane messages at once, on the transport's thread: as many as it likes, beginning with the first.
+pub type Shortcut = dyn Fn(LineId, Instant, &mut Messages<'_>) + Send + Sync;
 
 /// State-plane messages for one line.
 #[derive(Clone, Debug, Default)]
@@ -278,8 +279,8 @@ impl Switchboard {
         Instant::now()
     }
 
-    /// Lets state-plane packets be taken as they arrive, on the transport's threads and before they are queued. One that
-    /// is not taken is queued. It counts for lines that are opened from now on, and only the first shortcut does.
+    /// Lets state-plane messages be taken as they arrive, on the transport's threads and before they are queued. What is not
+    /// taken is queued. It counts for lines that are opened from now on, and only the first shortcut does.
     pub fn set_shortcut(&self, shortcut: Box<Shortcut>) {
         let _ = self.shortcut.set(shortcut);
     }
@@ -526,7 +527,9 @@ impl Clerk {
 
         if self.shortcut.get().is_some() {
             let shortcut = Arc::clone(&self.shortcut);
-            inbox.set_shortcut(Box::new(move |at, bytes| shortcut.get().is_some_and(|take| take(line, at, bytes))));
+            inbox.set_shortcut(Box::new(move |at, messages| {
+                shortcut.get().into_iter().for_each(|take| take(line, at, messages))
+            }));
         }
 
         let up = Arc::clone(&inbox);

@@ -13,7 +13,7 @@ use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::logs::Logs;
 use bus::queue::{Bell, Events};
 use bus::setup::Endpoint;
-use bus::switchboard::{HubEvent, LineId, Switchboard, SwitchboardConfig};
+use bus::switchboard::{HubEvent, LineId, Messages, Switchboard, SwitchboardConfig};
 use clap::Parser;
 use common::record::{ClockRecord, Name, Overrun, OverrunRow, Row, Settled};
 use common::time::Time;
@@ -113,18 +113,18 @@ pub fn run(args: Args) -> ExitCode {
 /// rest. What comes while the program is busy, or behind others that wait, is left to the loop.
 fn take_shortcut(program: &Arc<Shared<HubPort>>, bell: Bell<HubEvent>) {
     let weak: Weak<Shared<HubPort>> = Arc::downgrade(program);
-    let take = move |line: LineId, at: Instant, bytes: &[u8]| {
-        let Some(program) = weak.upgrade() else { return false };
-        let Some(mut program) = program.try_hold() else { return false };
+    let take = move |line: LineId, at: Instant, messages: &mut Messages<'_>| {
+        let Some(shared) = weak.upgrade() else { return };
+        let Some(mut program) = shared.try_hold() else { return };
         // Under the lock: the loop takes from the queue under it, too.
         if bell.is_crowded() || program.port.seats.get(line.index()) != Some(&Some(line)) {
-            return false;
+            return;
         }
-        let awaited = program.at_once(at, HubInput::State(line.index(), bytes.into()));
+        let states = std::iter::from_fn(|| if shared.is_wanted() { None } else { messages.next() });
+        let awaited = program.at_once(at, states.map(|bytes| HubInput::State(line.index(), bytes.into())));
         if program.port.send_at_once(at) || awaited {
             bell.ring();
         }
-        true
     };
     program.hold().port.switchboard.set_shortcut(Box::new(take));
 }

@@ -122,6 +122,10 @@ fn a_program_that_does_not_listen_loses_the_oldest_messages_and_is_told_how_many
 #[test]
 fn a_participant_that_takes_nothing_costs_the_oldest_states_with_a_count_and_gets_the_newest_when_it_does() {
     const COUNT: u32 = 40_000;
+    /// Bundles on their way at most, what each is reckoned to cost, and how many messages of these 6 bytes are put together.
+    const ON_THEIR_WAY: u64 = 32;
+    const COST: u64 = 16 << 10;
+    const MESSAGES_TOGETHER: u64 = (2 << 10) / 6;
     let (hub, hub_events) = hub();
     let lobby = plain_client(hub.endpoint().port());
     let client = plain_client(ask_for_line(&lobby, "idler", 7).expect("let in"));
@@ -138,24 +142,28 @@ fn a_participant_that_takes_nothing_costs_the_oldest_states_with_a_count_and_get
     let counts = hub.counts(number).expect("known");
     let waiting = u64::from(COUNT) - counts.state_out - counts.state_unsent;
     assert!(counts.state_unsent > u64::from(COUNT) / 2, "{counts:?}");
-    // 70 bytes with a header are on their way for each, and 6 wait.
-    assert!(counts.state_out * 70 <= 512 << 10 && waiting * 6 <= 64 << 10, "{counts:?}, {waiting} wait");
+    // As many bundles as may be are on their way, each with the first message that came for it, and the newest wait.
+    assert_eq!(counts.state_out, ON_THEIR_WAY, "{counts:?}");
+    assert!(waiting * 6 <= 64 << 10 && waiting * 6 > 60 << 10, "{counts:?}, {waiting} wait");
 
-    // Once it has taken all, what waits goes out: the newest, in order.
+    // Once it has taken all, what waits goes out: the newest, in order, and many together.
     let mut taken = vec![0x14];
-    taken.extend((counts.state_out * 70).to_le_bytes());
+    taken.extend((ON_THEIR_WAY * COST).to_le_bytes());
     put(taken);
-    let mut states = hears.iter().filter(|(key, _)| key.ends_with("/state")).map(|(_, bytes)| {
-        let number: [u8; 4] = bytes[2..].try_into().expect("one message, alone");
-        u64::from(u32::from_le_bytes(number))
-    });
-    for expected in (0..counts.state_out).chain(counts.state_out + counts.state_unsent..u64::from(COUNT)) {
-        assert_eq!(states.next(), Some(expected));
-        if expected + 1 == counts.state_out + counts.state_unsent + counts.state_out {
-            break; // as many as may be on their way
+    let (mut received, mut bundles) = (Vec::new(), 0);
+    for (_, bundle) in hears.iter().filter(|(key, _)| key.ends_with("/state")) {
+        for message in bundle.chunks(6) {
+            let number: [u8; 4] = message[2..].try_into().expect("of four bytes each");
+            received.push(u64::from(u32::from_le_bytes(number)));
+        }
+        bundles += 1;
+        if bundles == ON_THEIR_WAY + waiting.div_ceil(MESSAGES_TOGETHER).min(ON_THEIR_WAY) {
+            break;
         }
     }
-    assert!(hub.counts(number).expect("known").state_out > counts.state_out);
+    let all: Vec<u64> = (0..ON_THEIR_WAY).chain(u64::from(COUNT) - waiting..u64::from(COUNT)).collect();
+    assert!(received.len() as u64 > 10 * bundles);
+    assert_eq!(received, all[..received.len()]);
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! The channel's books: ledgers, totals, and what is recorded of every message.
 
-use std::cmp::Reverse;
-
 use common::record::{ClockRecord, Fate, NoteRow, Row, Settled};
 use common::time::Time;
 use common::wire::GarbageCount;
@@ -35,7 +33,7 @@ impl Emulator {
 
     /// Closes the books: what is under way, or still waits to be sent, is recorded as such.
     pub fn finish(&mut self, now: Time) {
-        for Reverse(message) in std::mem::take(&mut self.under_way).into_sorted_vec().into_iter().rev() {
+        while let Some(message) = self.under_way.pop() {
             let fate = if message.copy { Fate::CopyInFlight } else { Fate::InFlight };
             self.record_message(now, &message, fate);
         }

@@ -12,7 +12,9 @@
 //! | `air.rs` | what overlaps at a receiver, on a shared medium |
 //! | `books.rs` | what is written down about it |
 //! | `parcel.rs` | in which order messages arrive that are due at the same instant |
+//! | `agenda.rs` | which message arrives next |
 
+mod agenda;
 mod air;
 mod books;
 mod parcel;
@@ -21,8 +23,7 @@ mod sender;
 mod tests;
 mod wire;
 
-use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use common::graph::switching::Switching;
@@ -35,6 +36,7 @@ use common::time::{Span, Time};
 use common::wire::state::CoordinationState;
 use common::wire::{Garbage, GarbageCount};
 
+use self::agenda::Agenda;
 use self::air::{Air, Place};
 use self::books::{settled, unsent};
 use self::parcel::{Parcel, UnderWay};
@@ -86,7 +88,7 @@ pub struct Emulator {
     /// Which links were last recorded as up: those of the signal whose two ends are present.
     recorded_up: Vec<bool>,
     next_change: Option<Time>,
-    under_way: BinaryHeap<Reverse<UnderWay>>,
+    under_way: Agenda,
     /// Number of the newest message taken from each vehicle, to tell a repetition.
     newest: Vec<Option<u32>>,
     /// When each vehicle made its newest message, and the ξ in it.
@@ -130,7 +132,7 @@ impl Emulator {
             present: vec![true; n],
             recorded_up: vec![false; mission.links.len()],
             next_change: Some(Time::ZERO),
-            under_way: BinaryHeap::new(),
+            under_way: Agenda::default(),
             newest: vec![None; n],
             said: vec![None; n],
             taken: vec![0; n],
@@ -258,7 +260,7 @@ impl Emulator {
         }
         if let Some(due) = verdict.copy {
             wire.ledger.copy();
-            self.under_way.push(Reverse(UnderWay { due, copy: true, ..message.clone() }));
+            self.under_way.push(UnderWay { due, copy: true, ..message.clone() });
         }
         if let Some(medium) = &self.mission.medium {
             let place = Place { begin: due - airtime, key: self.receptions };
@@ -266,7 +268,7 @@ impl Emulator {
             message.reception = Some(place);
             self.receptions += 1;
         }
-        self.under_way.push(Reverse(message));
+        self.under_way.push(message);
     }
 
     /// A message has come to the end of its way: it is received if the link is up at that instant (p(t) gates reception,
@@ -340,7 +342,7 @@ impl Emulator {
                 self.change(next, true);
             } else if let Some((start, vehicle)) = self.next_speaker().filter(|(start, _)| *start <= next) {
                 self.speak(start, vehicle);
-            } else if let Some(Reverse(message)) = self.under_way.pop() {
+            } else if let Some(message) = self.under_way.pop() {
                 self.arrive(now, message);
             }
         }
@@ -381,7 +383,7 @@ impl Machine for Emulator {
     }
 
     fn poll_timeout(&self) -> Option<Time> {
-        let arrival = self.under_way.peek().map(|Reverse(message)| message.due);
+        let arrival = self.under_way.due();
         let speech = self.next_speaker().map(|(start, _)| start);
         [self.next_change, speech, arrival].into_iter().flatten().min()
     }
