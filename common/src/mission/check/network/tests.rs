@@ -1,5 +1,7 @@
 //! What is refused, and what presets become.
 
+mod preset_sources;
+
 use super::super::super::Mission;
 use super::super::super::file::Preset;
 use crate::time::{Span, Time};
@@ -158,7 +160,7 @@ fn a_mission_overrides_its_preset() {
     let mission = mission("preset = \"acoustic_long_range\"\ndelay = { constant = { delay_s = 2.0 } }");
     assert_eq!(mission.links[0].fixed_delay(), Some(Span::from_secs(2.0)));
     let medium = mission.medium.expect("the preset's");
-    assert_eq!(medium.airtime(39), Span::from_secs(2.0), "17 bytes at 80 bit/s after 0.3 s");
+    assert_eq!(medium.airtime(39), Span::from_secs(2.2), "17 bytes at 80 bit/s after 0.5 s");
     assert!(mission.links[0].range.is_limited() && mission.links[0].in_order);
 }
 

@@ -62,9 +62,9 @@ pub enum Preset {
     Perfect,
     /// An acoustic modem over kilometres: 80 bit/s, packets of 17 bytes, slots of 15 s.
     AcousticLongRange,
-    /// A small acoustic modem over hundreds of metres: 463 bit/s, no slots.
+    /// A small acoustic modem over hundreds of metres: 640 bit/s, no slots.
     AcousticShortRange,
-    /// Short messages over a satellite: many seconds late, in order.
+    /// Short messages over a satellite: 5 to 20 s late, in order.
     RadioOverTheHorizon,
     /// WiFi between hulls in a harbour: milliseconds, losses in bursts.
     WifiHarbour,
