@@ -35,6 +35,28 @@ pub struct StateRow {
     pub neighbours: u16,
 }
 
+impl StateRow {
+    /// All of its measures, in the order of the fields.
+    pub fn measures(&self) -> [f64; 14] {
+        [
+            self.xi,
+            self.xi_rate,
+            self.v_ref,
+            self.x_m,
+            self.y_m,
+            self.z_m,
+            self.yaw_rad,
+            self.pitch_rad,
+            self.roll_rad,
+            self.speed_mps,
+            self.e_along_m,
+            self.e_cross_m,
+            self.e_norm_m,
+            self.psi_e_rad,
+        ]
+    }
+}
+
 /// What became of a message on one directed link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -719,11 +719,10 @@ fn gallery(missions: &Path, out: &Path) -> Ended {
 }
 
 fn report(run: &Path) -> Ended {
-    let notes = folder::salvage(run).map_err(|error| End(4, error))?.unwrap_or_default();
-    for text in &notes {
+    for text in folder::salvage(run).map_err(|error| End(4, error))?.unwrap_or_default() {
         bus::remark!("{text}");
     }
-    folder::report(run, notes).map_err(|error| End(4, error))?;
+    folder::report(run).map_err(|error| End(4, error))?;
     bus::tell!("report: {}", run.join("report.html").display());
     Ok(ExitCode::SUCCESS)
 }

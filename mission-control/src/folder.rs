@@ -143,16 +143,20 @@ fn cpu() -> String {
 /// # Errors
 /// Which file is to blame, and why.
 pub fn finish(folder: &Path, host: &HostFacts) -> Result<(Summary, ClockSummary), String> {
+    write_host(folder, host)?;
+    report(folder)
+}
+
+fn write_host(folder: &Path, host: &HostFacts) -> Result<(), String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
-    write(&folder.join(HOST), &json)?;
-    report(folder, Vec::new())
+    write(&folder.join(HOST), &json)
 }
 
 /// Writes summary, figures and report of the recording in a run folder, again if need be.
 ///
 /// # Errors
 /// Which file is to blame, and why.
-pub fn report(folder: &Path, mut notes: Vec<String>) -> Result<(Summary, ClockSummary), String> {
+pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     let recording = recording(folder)?;
     let mission = Mission::parse(MISSION, &recording.mission_toml).map_err(|faults| faults.to_string())?;
     // A flight that was ended early is measured over what was flown.
@@ -162,7 +166,8 @@ pub fn report(folder: &Path, mut notes: Vec<String>) -> Result<(Summary, ClockSu
     facts.duration_s = end.secs();
     // A recording by itself has no host facts beside it.
     let host = fs::read(folder.join(HOST)).ok().and_then(|json| serde_json::from_slice::<HostFacts>(&json).ok());
-    notes.extend(host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)));
+    let notes =
+        host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)).collect();
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
     let reproduce = reproduce(folder, &mission, &recording);
     let account = Account { notes, reproduce };
@@ -212,8 +217,8 @@ pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Merges what the processes of a run recorded, if nobody did: mission-control was killed before. Gives notes for the report;
-/// `None` if there is a recording, or nothing to make it of.
+/// Merges what the processes of a run recorded, if nobody did: mission-control was killed before. Gives what is to be
+/// told of it; `None` if there is a recording, or nothing to make it of.
 ///
 /// # Errors
 /// Which file is to blame, and why.
@@ -227,8 +232,11 @@ pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
         return Ok(None);
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| error.to_string())?;
+    let how = format!("mission-control, from {} logs of a run that it did not end,", logs.len());
+    let missing = shortcomings(&merged);
     let mut notes = vec![format!("Merged from {} logs after the run: mission-control did not end it.", logs.len())];
-    notes.extend(shortcomings(&merged).into_iter().map(|text| format!("Missing: {text}")));
+    notes.extend(missing.iter().map(|text| format!("Missing: {text}")));
+    write_host(folder, &HostFacts::now(&how, None, 0.0, missing, Vec::new()))?;
     Ok(Some(notes))
 }
 

@@ -219,8 +219,11 @@ fn a_run_whose_mission_control_was_killed_is_reported_from_its_logs() {
     for id in ["auv1", "auv2", "auv3"] {
         assert!(cpf_tests::states(&recording.exact, id).last().is_some_and(|row| row.t_ns > 90_000_000_000), "{id}");
     }
-    let page = fs::read_to_string(ground.path("own/report.html")).expect("a report");
-    assert!(page.contains("mission-control did not end it"));
+    let page = || fs::read_to_string(ground.path("own/report.html")).expect("a report");
+    assert!(page().contains("from 4 logs of a run that it did not end"));
+    assert!(ground.json("own/host.json")["zenoh"].is_string(), "the versions of what made it");
+    ground.controlled(0, &["report", "own"]);
+    assert!(page().contains("from 4 logs of a run that it did not end"), "it is not forgotten");
 
     // The same without a report.
     fs::remove_file(ground.path("own/recording.mcap")).expect("there");

@@ -152,24 +152,7 @@ pub(crate) fn time_of(row: &Row) -> i64 {
 /// Whether every number in the row can be written as JSON.
 pub(super) fn is_finite(row: &Row) -> bool {
     match row {
-        Row::Exact(Record::State(s)) => [
-            s.xi,
-            s.xi_rate,
-            s.v_ref,
-            s.x_m,
-            s.y_m,
-            s.z_m,
-            s.yaw_rad,
-            s.pitch_rad,
-            s.roll_rad,
-            s.speed_mps,
-            s.e_along_m,
-            s.e_cross_m,
-            s.e_norm_m,
-            s.psi_e_rad,
-        ]
-        .iter()
-        .all(|value| value.is_finite()),
+        Row::Exact(Record::State(s)) => s.measures().iter().all(|value| value.is_finite()),
         Row::Exact(Record::Speed(row)) => row.speed.is_finite(),
         _ => true,
     }

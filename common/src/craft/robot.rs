@@ -194,14 +194,7 @@ impl RobotCraft {
 
     /// Its state as its instruments tell it.
     fn measured(&self) -> State {
-        let Some(errors) = self.conditions.errors else { return self.state };
-        State {
-            x: self.state.x + errors.position.x,
-            y: self.state.y + errors.position.y,
-            heading: self.state.heading + errors.heading,
-            speed: self.state.speed + errors.velocity.x,
-            turn_rate: self.state.turn_rate + errors.spin.z,
-        }
+        measured(&self.state, &self.conditions)
     }
 
     fn errors(&self, state: &State) -> Errors {
@@ -211,6 +204,18 @@ impl RobotCraft {
     fn move_target(&mut self, xi: f64) {
         self.xi = xi;
         self.target = self.path.at(xi);
+    }
+}
+
+/// A robot's state as its instruments tell it.
+pub(super) fn measured(state: &State, conditions: &Conditions) -> State {
+    let Some(errors) = conditions.errors else { return *state };
+    State {
+        x: state.x + errors.position.x,
+        y: state.y + errors.position.y,
+        heading: state.heading + errors.heading,
+        speed: state.speed + errors.velocity.x,
+        turn_rate: state.turn_rate + errors.spin.z,
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{SVector, Vector2};
 
-use super::robot::SpeedLoop;
+use super::robot::{SpeedLoop, measured};
 use super::{AT_CENTRE, Craft, LIMITED, Limits, Observation, REFUSED, SATURATED, Warning, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::Errors;
@@ -94,14 +94,7 @@ impl TrimmingCraft {
 
     /// Its state as its instruments tell it.
     fn measured(&self) -> State {
-        let Some(errors) = self.conditions.errors else { return self.state };
-        State {
-            x: self.state.x + errors.position.x,
-            y: self.state.y + errors.position.y,
-            heading: self.state.heading + errors.heading,
-            speed: self.state.speed + errors.velocity.x,
-            turn_rate: self.state.turn_rate + errors.spin.z,
-        }
+        measured(&self.state, &self.conditions)
     }
 
     /// The vehicle in `state` against `foot`.

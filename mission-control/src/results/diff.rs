@@ -176,23 +176,7 @@ fn parting(a: &Record, b: &Record) -> Option<Outcome> {
 
 fn has_zero(row: &Record) -> bool {
     match row {
-        Record::State(s) => [
-            s.xi,
-            s.xi_rate,
-            s.v_ref,
-            s.x_m,
-            s.y_m,
-            s.z_m,
-            s.yaw_rad,
-            s.pitch_rad,
-            s.roll_rad,
-            s.speed_mps,
-            s.e_along_m,
-            s.e_cross_m,
-            s.e_norm_m,
-            s.psi_e_rad,
-        ]
-        .contains(&0.0),
+        Record::State(s) => s.measures().contains(&0.0),
         Record::Speed(row) => row.speed == 0.0,
         _ => false,
     }
