@@ -40,8 +40,10 @@ pub mod polynomial;
 pub mod proposition_3_4;
 pub mod proposition_3_6;
 pub mod proposition_3_8;
+pub mod steady_motion;
 pub mod theorem_4_4;
 pub mod theorem_4_5;
+pub mod theorem_4_8;
 
 /// What a statement says of a mission or of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
