@@ -71,7 +71,12 @@ pub fn steady_motion(vehicles: &[Settling], graph: &Graph, v_l: f64, v_n: f64, l
 
 /// Whether all settle alike, so that they agree, whatever the network does.
 pub fn alike(vehicles: &[Settling]) -> bool {
-    vehicles.windows(2).all(|pair| pair[0].alpha_2 == pair[1].alpha_2 && pair[0].kappa == pair[1].kappa)
+    // Lines in other directions differ in |p'| by a rounding error.
+    let same = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-9 * a.abs();
+    let pair_alike = |a: &Settling, b: &Settling| {
+        a.alpha_2.iter().zip(&b.alpha_2).all(|(a, b)| same(*a, *b)) && same(a.kappa, b.kappa)
+    };
+    vehicles.windows(2).all(|pair| pair_alike(&pair[0], &pair[1]))
 }
 
 #[cfg(test)]

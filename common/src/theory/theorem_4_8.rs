@@ -279,8 +279,12 @@ mod tests {
     }
 
     fn any_line() -> impl Strategy<Value = OnALine> {
-        (0.5..6.0f64, 0.2..3.0f64, 0.2..4.0f64, 0.0..2.0f64)
-            .prop_map(|(mass, k_e, k_phi, stretch)| OnALine { mass, k_e, k_phi, stretch })
+        (0.5..6.0f64, 0.2..3.0f64, 0.2..4.0f64, 0.0..2.0f64).prop_map(|(mass, k_e, k_phi, stretch)| OnALine {
+            mass,
+            k_e,
+            k_phi,
+            stretch,
+        })
     }
 
     /// γ~ of a fleet.

@@ -1,11 +1,14 @@
 //! Auxiliary state: Theorems 4.8 and 4.9.
 
+use common::mission::Mission;
 use common::mission::file::Auxiliary;
 use common::theory::lemma_4_6::Dynamic;
+use common::theory::theorem_4_8::{Coupled, OnALine};
 
+use super::surroundings::on_lines;
 use super::switching::moves_as_told;
-use super::{Case, Guarantee};
-use crate::results::TheoryRow;
+use super::{Case, Guarantee, mode_words};
+use crate::results::{Summary, TheoryRow};
 
 fn dynamic(case: &Case<'_>, law: &Auxiliary) -> Option<Dynamic> {
     Dynamic::new(law.a1, law.a2, &case.network.graphs)
@@ -21,27 +24,86 @@ pub(super) fn guarantee(case: &Case<'_>, law: &Auxiliary) -> Option<Guarantee> {
     Some(Guarantee { rate: 0.5 * best.rate_of_v(alpha), factor }).filter(|guarantee| guarantee.rate > 0.0)
 }
 
-/// (4.59)–(4.61): Theorem 4.8.
+/// (4.59)–(4.61): Theorem 4.8. Into a ball from everywhere, and on lines to zero.
 pub(super) fn rows_fixed(case: &Case<'_>, law: &Auxiliary) -> Vec<TheoryRow> {
+    [Some(into_a_ball(case, law)), on_lines(case.mission).then(|| to_zero(case, law))].into_iter().flatten().collect()
+}
+
+/// What is in the way of a network as the theorem has it.
+fn network_lacks(case: &Case<'_>) -> Vec<&'static str> {
     let graph = &case.network.graph;
-    let rate = dynamic(case, law).and_then(|dynamic| dynamic.rate_on(graph));
-    let fixed = case.network.is_fixed();
-    vec![TheoryRow {
-        name: "Agreement into a ball set by δ (Theorem 4.8)".into(),
+    let lacks = [
+        (graph.is_undirected() && graph.is_connected(), "one-way links, or not connected"),
+        (case.network.is_fixed(), "changes, delays or loses"),
+    ];
+    lacks.into_iter().filter(|(met, _)| !met).map(|(_, lack)| lack).collect()
+}
+
+/// α₂ does not vanish while δ ≠ 0: what the theorem promises is the way into a ball.
+fn into_a_ball(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
+    let (mission, graph) = (case.mission, &case.network.graph);
+    let vehicles: Option<Vec<_>> = (0..mission.vehicles.len()).map(|i| mission.underactuated(i)).collect();
+    let fleet = vehicles.and_then(|vehicles| Coupled::new(law.a1, law.a2, &vehicles));
+    let deltas = (0..mission.vehicles.len()).filter_map(|i| Some(mission.theorem_47(i)?.0.delta1.powi(2)));
+    let delta = deltas.sum::<f64>().sqrt();
+    let lacks = network_lacks(case);
+    let promised = fleet.filter(|_| lacks.is_empty()).and_then(|fleet| {
+        Some((fleet.rate(graph)?, fleet.coordination_ball(graph, delta)?, dynamic(case, law)?.rate_on(graph)?))
+    });
+    let last = |s: &Summary| s.fleet.coordination.series.norm.last().copied().unwrap_or(f64::NAN);
+    TheoryRow {
+        name: "Agreement into a ball set by δ (Theorem 4.8, result xii)".into(),
         condition: "fixed two-way connected network, no delay, no loss".into(),
-        value: format!(
-            "{}, {}",
-            if rate.is_some() { "two-way, connected" } else { "one-way links, or not connected" },
-            if fixed { "fixed" } else { "changes, delays or loses" }
-        ),
-        holds: Some(fixed && graph.is_undirected() && graph.is_connected()),
-        // α₂ does not vanish while δ ≠ 0: what decays is the distance from where it leads, so that no rate is guaranteed for e.
-        predicted: rate
-            .filter(|_| fixed)
-            .map_or("–".into(), |rate| format!("slowest mode {rate:.5} 1/s, down to the ball that α₂ leaves")),
+        value: if lacks.is_empty() { format!("two-way, connected, fixed; |δ| = {delta:.3} m/s") } else { lacks.join("; ") },
+        holds: Some(promised.is_some()),
+        predicted: promised.map_or("–".into(), |(rate, ball, alone)| {
+            format!(
+                "path following and coordination decay at ≥ {rate:.5} 1/s into a ball, ‖e‖ ≤ {ball:.3}; were α₂ zero, ‖e‖ at {alone:.5} 1/s"
+            )
+        }),
         guaranteed_rate: None,
+        measured: format!("{}{}", case.fitted_rate(), case.summary.map_or(String::new(), |s| format!("; ‖e‖ = {:.3e} at the end", last(s)))),
+    }
+}
+
+/// Vehicles that are alike, on straight lines and along them: δ acts on their mean only.
+fn to_zero(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
+    let mission = case.mission;
+    let each: Option<Vec<(OnALine, f64)>> = (0..mission.vehicles.len()).map(|i| on_a_line(mission, i)).collect();
+    let one = each.as_ref().and_then(|each| each.first()).copied();
+    let alike = each.as_ref().is_some_and(|each| each.windows(2).all(|pair| same(&pair[0], &pair[1])));
+    let along = (0..mission.vehicles.len()).all(|i| mission.starts_along_its_path(i));
+    let mut lacks = network_lacks(case);
+    lacks.extend((!alike).then_some("vehicles, gains or |p'| that differ"));
+    lacks.extend((!along).then_some("not all start on their lines and point along them"));
+    let met = one.filter(|_| lacks.is_empty());
+    let slowest = met.and_then(|(line, _)| line.slowest(law.a1, law.a2, &case.network.graph));
+    TheoryRow {
+        name: "Agreement of equal vehicles on straight lines, whatever δ (Theorem 4.8, result xii)".into(),
+        condition: "fixed two-way connected network, no delay, no loss; equal vehicles, gains and |p'|, each on its line and along it".into(),
+        value: if lacks.is_empty() { "equal, along their lines".into() } else { lacks.join("; ") },
+        holds: Some(slowest.is_some()),
+        predicted: slowest.map_or("–".into(), |slowest| match slowest {
+            (rate, 1) => format!("‖e‖ decays at ≥ {rate:.5} 1/s"),
+            several => mode_words(several),
+        }),
+        guaranteed_rate: slowest.filter(|(_, times)| *times == 1).map(|(rate, _)| rate),
         measured: case.fitted_rate(),
-    }]
+    }
+}
+
+/// Whether two vehicles move alike along their lines, but for rounding.
+fn same((a, delta_a): &(OnALine, f64), (b, delta_b): &(OnALine, f64)) -> bool {
+    let stretch = (a.stretch - b.stretch).abs() <= 1e-9 * a.stretch;
+    stretch && OnALine { stretch: a.stretch, ..*b } == *a && delta_a == delta_b
+}
+
+/// What moves a vehicle along a line, and its δ₁.
+fn on_a_line(mission: &Mission, vehicle: usize) -> Option<(OnALine, f64)> {
+    let (gains, auv) = mission.theorem_47(vehicle)?;
+    let plan = mission.vehicles.get(vehicle)?;
+    let stretch = plan.path.at(plan.start.xi).r();
+    Some((OnALine { mass: auv.parameters().mass.x, k_e: gains.k_e, k_phi: gains.k_phi, stretch }, gains.delta1))
 }
 
 /// (4.62): Theorem 4.9.
