@@ -30,6 +30,12 @@
 //! |x(t)| ≤ |x(0)| e^(−μt) + (|δ|/μ)(1 − e^(−μt)),    ‖γ~‖ ≤ |x|/√λ_2   ∎
 //! ```
 //!
+//! In the end less is left. Let a part ε of −k_e e'M⁻¹e bear δ, e_1δ_1 ≤ εk_e e_1²/m_11 + m_11δ_1²/(4εk_e), and μ_ε be the μ of (1 − ε)k_e:
+//!
+//! ```text
+//! limsup |x|² ≤ Σ m_11δ_1²/k_e / (4 ε μ_ε)    for every ε in (0, 1)
+//! ```
+//!
 //! # To zero, for equal vehicles on straight lines ([`OnALine`])
 //!
 //! A vehicle that starts on its line, points along it and moves along it stays there: nothing in Theorem 4.7 pushes it aside. With
@@ -99,14 +105,26 @@ impl Coupled {
         Some(coupled.min(self.decay[2])).filter(|rate| *rate > 0.0)
     }
 
-    /// |x| in the end at most, `delta` being |δ| of all vehicles together \[m/s\].
+    /// The radius |δ|/μ of the ball into which |x| decays at [`Coupled::rate`], `delta` being |δ| of all vehicles together \[m/s\].
     pub fn ball(&self, graph: &Graph, delta: f64) -> Option<f64> {
         Some(delta.abs() / self.rate(graph)?)
     }
 
+    /// |x| in the end at most; `pushed` is the sum of m_11δ_1²/k_e over the vehicles.
+    pub fn in_the_end(&self, graph: &Graph, pushed: f64) -> Option<f64> {
+        const STEPS: u32 = 50;
+        let with = |step: u32| {
+            let part = f64::from(step) / f64::from(STEPS);
+            let mut left = *self;
+            left.decay[0] *= 1.0 - part;
+            Some(pushed.max(0.0) / (4.0 * part * left.rate(graph)?))
+        };
+        (1..STEPS).filter_map(with).min_by(f64::total_cmp).map(f64::sqrt)
+    }
+
     /// ‖γ~‖ in the end at most.
-    pub fn coordination_ball(&self, graph: &Graph, delta: f64) -> Option<f64> {
-        Some(self.ball(graph, delta)? / modes(graph)?.first()?.sqrt())
+    pub fn apart_in_the_end(&self, graph: &Graph, pushed: f64) -> Option<f64> {
+        Some(self.in_the_end(graph, pushed)? / modes(graph)?.first()?.sqrt())
     }
 }
 
@@ -241,6 +259,7 @@ mod tests {
         for graph in [Graph::empty(2), Graph::from_arcs(2, &[(0, 1)]), Graph::from_edges(4, &[(0, 1), (2, 3)])] {
             assert_eq!((fleet.rate(&graph), line.slowest(1.0, 3.0, &graph)), (None, None));
             assert_eq!((fleet.ball(&graph, 0.3), line.overshoot(1.0, 3.0, &graph, 0.0)), (None, None));
+            assert_eq!((fleet.in_the_end(&graph, 1.0), fleet.apart_in_the_end(&graph, 1.0)), (None, None));
         }
         assert!(Coupled::new(0.0, 1.0, &[section_4_6()]).is_none() && Coupled::new(1.0, 1.0, &[]).is_none());
         let stuck = Underactuated { gains: [0.5, 0.0, 4.0, 1.0], ..section_4_6() };
@@ -296,7 +315,6 @@ mod tests {
     /// A fleet of underactuated vehicles under (4.59), held for `DT`.
     struct Fleet {
         graph: Graph,
-        law: Auxiliary,
         laws: Vec<Box<dyn VehicleLaw>>,
         craft: Vec<AuvCraft>,
         paths: Vec<Arc<dyn Path>>,
@@ -321,7 +339,7 @@ mod tests {
                 .map(|(path, state, gamma)| AuvCraft::new(following, TargetMotion::TypeII, 1.0, path, state, gamma))
                 .collect();
             let laws = (0..graph.len()).map(|i| law.vehicle(i)).collect();
-            Fleet { graph: graph.clone(), law, laws, craft, paths, reference: SpeedReference { v_l, v_l_dot: 0.0 } }
+            Fleet { graph: graph.clone(), laws, craft, paths, reference: SpeedReference { v_l, v_l_dot: 0.0 } }
         }
 
         fn gamma(&self) -> Vec<f64> {
@@ -390,6 +408,8 @@ mod tests {
         let fleet = Coupled::new(10.0, 16.0, &[section_4_6()]).expect("positive");
         let rate = fleet.rate(&star).expect("connected");
         let ball = fleet.ball(&star, 0.3 * 3f64.sqrt()).expect("connected");
+        let at_last = fleet.in_the_end(&star, 3.0 * 4.7 * 0.09 / 0.5).expect("connected");
+        assert!(at_last < 0.7 * ball, "{at_last} {ball}");
         let mut stream = Stream::new(48, "Theorem 4.8");
         let mut tightest = f64::INFINITY;
         for _ in 0..6 {
@@ -414,9 +434,30 @@ mod tests {
                 assert!(size < 1.01 * bound, "{second} s: {size} {bound}");
                 tightest = tightest.min(bound / size);
             }
+            flight.fly(80.0);
+            let size = flight.size();
+            // δ keeps |e| alone at 0.94 m.
+            assert!(size < at_last && size > 0.9 * 3f64.sqrt(), "{size} {at_last}");
         }
         // Not so far above that a rate of twice the size would go unnoticed.
         assert!(tightest < 1.5, "{tightest}");
+    }
+
+    #[test]
+    fn two_vehicles_on_lines_decay_at_just_that_rate() {
+        let (pair, gains) = (Graph::complete(2), Gains::default());
+        let line = OnALine { mass: 4.7, k_e: gains.k_e, k_phi: gains.k_phi, stretch: 1.0 };
+        let (rate, _) = line.slowest(10.0, 6.0, &pair).expect("connected");
+        let mut fleet =
+            Fleet::new(&pair, [10.0, 6.0], 0.15, on_lines(1.0, &[2.0, 0.0], &[0.5, -0.5], &[0.0, 0.3]), gains);
+        fleet.fly(6.0 / rate);
+        let before = apart(&fleet.gamma());
+        fleet.fly(6.0 / rate);
+        let seen = (before / apart(&fleet.gamma())).ln() * rate / 6.0;
+        assert!((seen / rate - 1.0).abs() < 0.01, "{seen} {rate}");
+        // Without α_2 it would be another.
+        let alone = OnALine { stretch: 0.0, ..line }.slowest(10.0, 6.0, &pair).expect("connected").0;
+        assert!((alone / rate - 1.0).abs() > 0.05, "{alone} {rate}");
     }
 
     proptest! {
@@ -501,10 +542,10 @@ mod tests {
             let states = DVector::from_column_slice(&gamma[..n]);
             let start = ((states.transpose() * l * &states)[0] + apart(&ahead[..n]).powi(2) + apart(&p).powi(2)).sqrt();
             let lambda_2 = modes(&graph).expect("connected")[0];
-            let seconds = 14.0 / slowest;
-            for part in 1..=14 {
-                fleet.fly(seconds / 14.0);
-                let t = seconds * f64::from(part) / 14.0;
+            let seconds = 20.0 / slowest;
+            for part in 1..=20 {
+                fleet.fly(seconds / 20.0);
+                let t = seconds * f64::from(part) / 20.0;
                 let bound = factor * (-rate * t).exp() * start / lambda_2.sqrt();
                 let error = apart(&fleet.gamma());
                 // Holding the command for 20 ms costs a little of the rate.

@@ -5,6 +5,7 @@ use common::mission::file::Auxiliary;
 use common::theory::lemma_4_6::Dynamic;
 use common::theory::theorem_4_8::{Coupled, OnALine};
 
+use super::fleet::excused;
 use super::surroundings::on_lines;
 use super::switching::moves_as_told;
 use super::{Case, Guarantee, mode_words};
@@ -26,7 +27,12 @@ pub(super) fn guarantee(case: &Case<'_>, law: &Auxiliary) -> Option<Guarantee> {
 
 /// (4.59)–(4.61): Theorem 4.8. Into a ball from everywhere, and on lines to zero.
 pub(super) fn rows_fixed(case: &Case<'_>, law: &Auxiliary) -> Vec<TheoryRow> {
-    [Some(into_a_ball(case, law)), on_lines(case.mission).then(|| to_zero(case, law))].into_iter().flatten().collect()
+    let mut rows = vec![into_a_ball(case, law)];
+    if on_lines(case.mission) {
+        // Who lacks what it asks for still has the theorem.
+        rows.push(excused(to_zero(case, law), &rows));
+    }
+    rows
 }
 
 /// What is in the way of a network as the theorem has it.
@@ -44,11 +50,15 @@ fn into_a_ball(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
     let (mission, graph) = (case.mission, &case.network.graph);
     let vehicles: Option<Vec<_>> = (0..mission.vehicles.len()).map(|i| mission.underactuated(i)).collect();
     let fleet = vehicles.and_then(|vehicles| Coupled::new(law.a1, law.a2, &vehicles));
-    let deltas = (0..mission.vehicles.len()).filter_map(|i| Some(mission.theorem_47(i)?.0.delta1.powi(2)));
-    let delta = deltas.sum::<f64>().sqrt();
+    let of_delta = |i: usize| {
+        let (gains, auv) = mission.theorem_47(i)?;
+        Some([gains.delta1.powi(2), auv.parameters().mass.x * gains.delta1.powi(2) / gains.k_e])
+    };
+    let sums = (0..mission.vehicles.len()).filter_map(of_delta).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    let [delta, pushed] = [sums[0].sqrt(), sums[1]];
     let lacks = network_lacks(case);
     let promised = fleet.filter(|_| lacks.is_empty()).and_then(|fleet| {
-        Some((fleet.rate(graph)?, fleet.coordination_ball(graph, delta)?, dynamic(case, law)?.rate_on(graph)?))
+        Some((fleet.rate(graph)?, fleet.apart_in_the_end(graph, pushed)?, dynamic(case, law)?.rate_on(graph)?))
     });
     let last = |s: &Summary| s.fleet.coordination.series.norm.last().copied().unwrap_or(f64::NAN);
     TheoryRow {
@@ -56,9 +66,9 @@ fn into_a_ball(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
         condition: "fixed two-way connected network, no delay, no loss".into(),
         value: if lacks.is_empty() { format!("two-way, connected, fixed; |δ| = {delta:.3} m/s") } else { lacks.join("; ") },
         holds: Some(promised.is_some()),
-        predicted: promised.map_or("–".into(), |(rate, ball, alone)| {
+        predicted: promised.map_or("–".into(), |(rate, apart, alone)| {
             format!(
-                "path following and coordination decay at ≥ {rate:.5} 1/s into a ball, ‖e‖ ≤ {ball:.3}; were α₂ zero, ‖e‖ at {alone:.5} 1/s"
+                "all errors together decay at ≥ {rate:.5} 1/s into a ball, ‖e‖ ≤ {apart:.3} in the end; with α₂ = 0 ‖e‖ would at {alone:.5} 1/s"
             )
         }),
         guaranteed_rate: None,
@@ -75,12 +85,14 @@ fn to_zero(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
     let along = (0..mission.vehicles.len()).all(|i| mission.starts_along_its_path(i));
     let mut lacks = network_lacks(case);
     lacks.extend((!alike).then_some("vehicles, gains or |p'| that differ"));
-    lacks.extend((!along).then_some("not all start on their lines and point along them"));
+    lacks.extend(
+        (!along).then_some("not all start on their lines and point along them: how hulls turn is not in the statement"),
+    );
     let met = one.filter(|_| lacks.is_empty());
     let slowest = met.and_then(|(line, _)| line.slowest(law.a1, law.a2, &case.network.graph));
     TheoryRow {
         name: "Agreement of equal vehicles on straight lines, whatever δ (Theorem 4.8, result xii)".into(),
-        condition: "fixed two-way connected network, no delay, no loss; equal vehicles, gains and |p'|, each on its line and along it".into(),
+        condition: "the same; equal vehicles, gains and |p'|, each starts on its line and along it".into(),
         value: if lacks.is_empty() { "equal, along their lines".into() } else { lacks.join("; ") },
         holds: Some(slowest.is_some()),
         predicted: slowest.map_or("–".into(), |slowest| match slowest {

@@ -169,6 +169,10 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
     let v_l = v_l_at_the_end(case);
     let excited = is_excited(mission);
     let why_not = excited.then(|| motion(case, v_l).err()).flatten();
+    let holds = match (excited, mission.law_delay()) {
+        (true, _) => Some(why_not.is_none() && case.disturbances.is_empty()),
+        (false, tau) => tau.map(|tau| told_truly(mission, tau)),
+    };
     let (name, condition, value) = match (mission.law_delay(), travels(mission)) {
         (_, Travel::Nowhere) => {
             let why = if stuck_at_the_end(mission).is_empty() { "no coordination" } else { "a failure (see above)" };
@@ -198,11 +202,10 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
         name: name.into(),
         condition,
         value,
-        holds: match (excited, mission.law_delay()) {
-            (true, _) => Some(why_not.is_none() && case.disturbances.is_empty()),
-            (false, tau) => tau.map(|tau| told_truly(mission, tau)),
-        },
-        predicted: predicted_speed(mission, v_l).map_or("–".into(), |speed| format!("{speed:.5} 1/s")),
+        holds,
+        predicted: predicted_speed(mission, v_l)
+            .filter(|_| !excited || holds == Some(true))
+            .map_or("–".into(), |speed| format!("{speed:.5} 1/s")),
         measured: case.measured(|s| format!("{:.5} 1/s", s.fleet.steady_speed)),
         ..TheoryRow::default()
     }
