@@ -11,6 +11,9 @@ use super::switching::moves_as_told;
 use super::{Case, Guarantee, mode_words};
 use crate::results::{Summary, TheoryRow};
 
+/// The part of the slowest root at which a bound on the transient is shown.
+const BELOW_THE_ROOT: f64 = 0.9;
+
 fn dynamic(case: &Case<'_>, law: &Auxiliary) -> Option<Dynamic> {
     Dynamic::new(law.a1, law.a2, &case.network.graphs)
 }
@@ -95,9 +98,17 @@ fn to_zero(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
         condition: "the same; equal vehicles, gains and |p'|, each starts on its line and along it".into(),
         value: if lacks.is_empty() { "equal, along their lines".into() } else { lacks.join("; ") },
         holds: Some(slowest.is_some()),
-        predicted: slowest.map_or("–".into(), |slowest| match slowest {
-            (rate, 1) => format!("‖e‖ decays at ≥ {rate:.5} 1/s"),
-            several => mode_words(several),
+        predicted: slowest.map_or("–".into(), |slowest| {
+            let rate = match slowest {
+                (rate, 1) => format!("‖e‖ decays at ≥ {rate:.5} 1/s"),
+                several => mode_words(several),
+            };
+            // At the root itself there need be no bound.
+            let below = BELOW_THE_ROOT * slowest.0;
+            let factor = met.and_then(|(line, _)| line.overshoot(law.a1, law.a2, &case.network.graph, below));
+            factor.map_or(rate.clone(), |factor| {
+                format!("{rate}; with those of path following, less their means, errors stay below {factor:.2} e^(−{below:.5} t) times their start")
+            })
         }),
         guaranteed_rate: slowest.filter(|(_, times)| *times == 1).map(|(rate, _)| rate),
         measured: case.fitted_rate(),
