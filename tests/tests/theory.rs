@@ -226,7 +226,8 @@ fn equal_vehicles_on_lines_agree_at_the_rate_of_theorem_4_8_whatever_delta() {
     // Without α₂ it would be 0.06145; the bound from everywhere is below.
     assert!((0.05..0.0595).contains(&guaranteed), "{guaranteed}");
     let ball = rows.iter().find(|row| row.name.contains("into a ball")).expect("of every mission");
-    assert!(ball.holds == Some(true) && ball.guaranteed_rate.is_none(), "{ball:?}");
+    assert!(ball.holds == Some(true) && ball.guaranteed_rate.is_none() && !ball.is_below(), "{ball:?}");
+    assert!(ball.measured.contains("% of the bound"), "{ball:?}");
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub use speed::SpeedProfile;
 
 use crate::coordination::FleetLaw;
 use crate::craft::{Craft, Limits};
-use crate::following::theorem_4_7::Gains;
+use crate::following::theorem_4_7::{Gains, TargetRate, Theorem47};
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::network::Medium;
@@ -212,6 +212,18 @@ impl Mission {
             }
             _ => None,
         }
+    }
+
+    /// W_3 of (4.49) of a vehicle at the start, for targets that are to go at the mission's first v_n; `None` under other path-following
+    /// laws than that of Theorem 4.7.
+    #[doc(alias = "W_3")]
+    pub fn lyapunov_at_start(&self, vehicle: usize) -> Option<f64> {
+        let (gains, auv) = self.theorem_47(vehicle)?;
+        let VehiclePlan { path, start, .. } = self.vehicles.get(vehicle)?;
+        let law = Theorem47::new(gains, auv).ok()?;
+        let v_n = self.nominal_factor() * self.speed.at(Time::ZERO).v_l;
+        let rate = TargetRate { nominal: v_n, nominal_dot: 0.0, actual: v_n };
+        Some(law.lyapunov(&law.evaluate(&build::auv_state(start), &path.at(start.xi), rate)))
     }
 
     /// Whether a vehicle starts on the tangent of its path where its target is, and points along it: to a micrometre and a microradian.

@@ -110,6 +110,12 @@ impl Coupled {
         Some(delta.abs() / self.rate(graph)?)
     }
 
+    /// ‖γ~‖ at most, `t` seconds after |x| was `start`.
+    pub fn apart_after(&self, graph: &Graph, delta: f64, start: f64, t: f64) -> Option<f64> {
+        let decay = (-self.rate(graph)? * t).exp();
+        Some((start * decay + self.ball(graph, delta)? * (1.0 - decay)) / modes(graph)?.first()?.sqrt())
+    }
+
     /// |x| in the end at most; `pushed` is the sum of m_11δ_1²/k_e over the vehicles.
     pub fn in_the_end(&self, graph: &Graph, pushed: f64) -> Option<f64> {
         const STEPS: u32 = 50;
@@ -426,6 +432,7 @@ mod tests {
                 .collect();
             let mut flight = Fleet::new(&star, [10.0, 16.0], 0.5, starts, Gains::default());
             let start = flight.size();
+            let bound_of_apart = |t: f64| fleet.apart_after(&star, 0.3 * 3f64.sqrt(), start, t).expect("connected");
             for second in 1..=120 {
                 flight.fly(1.0);
                 let decay = (-rate * f64::from(second)).exp();
@@ -433,6 +440,7 @@ mod tests {
                 // Holding the command costs a little.
                 assert!(size < 1.01 * bound, "{second} s: {size} {bound}");
                 tightest = tightest.min(bound / size);
+                assert!(apart(&flight.gamma()) < 1.01 * bound_of_apart(f64::from(second)));
             }
             flight.fly(80.0);
             let size = flight.size();

@@ -1,15 +1,17 @@
 //! Auxiliary state: Theorems 4.8 and 4.9.
 
-use common::mission::Mission;
+use common::graph::Graph;
 use common::mission::file::Auxiliary;
+use common::mission::{Mission, VehiclePlan};
 use common::theory::lemma_4_6::Dynamic;
 use common::theory::theorem_4_8::{Coupled, OnALine};
+use common::time::Time;
 
-use super::fleet::excused;
-use super::surroundings::on_lines;
+use super::fleet::{excused, v_l_at_the_end};
+use super::surroundings::{last_step, on_lines};
 use super::switching::moves_as_told;
 use super::{Case, Guarantee, mode_words};
-use crate::results::{Summary, TheoryRow};
+use crate::results::{BELOW, Summary, TheoryRow};
 
 /// The part of the slowest root at which a bound on the transient is shown.
 const BELOW_THE_ROOT: f64 = 0.9;
@@ -50,32 +52,85 @@ fn network_lacks(case: &Case<'_>) -> Vec<&'static str> {
 
 /// α₂ does not vanish while δ ≠ 0: what the theorem promises is the way into a ball.
 fn into_a_ball(case: &Case<'_>, law: &Auxiliary) -> TheoryRow {
-    let (mission, graph) = (case.mission, &case.network.graph);
-    let vehicles: Option<Vec<_>> = (0..mission.vehicles.len()).map(|i| mission.underactuated(i)).collect();
-    let fleet = vehicles.and_then(|vehicles| Coupled::new(law.a1, law.a2, &vehicles));
-    let of_delta = |i: usize| {
-        let (gains, auv) = mission.theorem_47(i)?;
-        Some([gains.delta1.powi(2), auv.parameters().mass.x * gains.delta1.powi(2) / gains.k_e])
-    };
-    let sums = (0..mission.vehicles.len()).filter_map(of_delta).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-    let [delta, pushed] = [sums[0].sqrt(), sums[1]];
+    let graph = &case.network.graph;
     let lacks = network_lacks(case);
-    let promised = fleet.filter(|_| lacks.is_empty()).and_then(|fleet| {
-        Some((fleet.rate(graph)?, fleet.apart_in_the_end(graph, pushed)?, dynamic(case, law)?.rate_on(graph)?))
+    let ball = Ball::of(case, law).filter(|_| lacks.is_empty());
+    let last = |s: &Summary| s.fleet.coordination.series.norm.last().copied();
+    // A vehicle that comes back begins anew.
+    let whole = case.summary.filter(|s| s.fleet.absences.is_empty());
+    let share = whole.and_then(|s| ball.as_ref()?.share(graph, s));
+    let measured = case.measured(|s| {
+        let last = last(s).map_or(String::new(), |last| format!("; ‖e‖ = {last:.3e} at the end"));
+        let share = share.map_or(String::new(), |share| match share <= 1.0 {
+            true => format!("; at most {:.0} % of the bound", 100.0 * share),
+            false => format!("; {share:.2} times the bound: {BELOW}"),
+        });
+        format!("{}{last}{share}", case.fitted_rate())
     });
-    let last = |s: &Summary| s.fleet.coordination.series.norm.last().copied().unwrap_or(f64::NAN);
     TheoryRow {
         name: "Agreement into a ball set by δ (Theorem 4.8, result xii)".into(),
         condition: "fixed two-way connected network, no delay, no loss".into(),
-        value: if lacks.is_empty() { format!("two-way, connected, fixed; |δ| = {delta:.3} m/s") } else { lacks.join("; ") },
-        holds: Some(promised.is_some()),
-        predicted: promised.map_or("–".into(), |(rate, apart, alone)| {
-            format!(
-                "all errors together decay at ≥ {rate:.5} 1/s into a ball, ‖e‖ ≤ {apart:.3} in the end; with α₂ = 0 ‖e‖ would at {alone:.5} 1/s"
-            )
-        }),
+        value: match &ball {
+            Some(ball) => format!("two-way, connected, fixed; |δ| = {:.3} m/s", ball.delta),
+            None => lacks.join("; "),
+        },
+        holds: Some(ball.is_some()),
+        predicted: ball.and_then(|ball| ball.words(graph, dynamic(case, law)?.rate_on(graph)?)).unwrap_or("–".into()),
         guaranteed_rate: None,
-        measured: format!("{}{}", case.fitted_rate(), case.summary.map_or(String::new(), |s| format!("; ‖e‖ = {:.3e} at the end", last(s)))),
+        measured,
+    }
+}
+
+/// What Theorem 4.8 knows of a mission.
+struct Ball {
+    fleet: Coupled,
+    /// |δ| of all vehicles together.
+    delta: f64,
+    /// The sum of m_11δ_1²/k_e.
+    pushed: f64,
+    /// |x| at the start; `None` if v_L steps, for what is said is said of the time after.
+    start: Option<f64>,
+}
+
+impl Ball {
+    fn of(case: &Case<'_>, law: &Auxiliary) -> Option<Ball> {
+        let mission = case.mission;
+        let all = 0..mission.vehicles.len();
+        let vehicles: Vec<_> = all.clone().map(|i| mission.underactuated(i)).collect::<Option<_>>()?;
+        let (mut delta, mut pushed, mut start) = (0.0, 0.0, 0.0);
+        for i in all {
+            let (gains, auv) = mission.theorem_47(i)?;
+            delta += gains.delta1.powi(2);
+            pushed += auv.parameters().mass.x * gains.delta1.powi(2) / gains.k_e;
+            start += 2.0 * mission.lyapunov_at_start(i)?;
+        }
+        let of = |plan: &VehiclePlan| plan.start.xi - plan.pattern.at(Time::ZERO).h;
+        let gamma = mission.vehicles.iter().map(of).collect::<Vec<f64>>();
+        // γ'Lγ, link by link.
+        start += case.network.graph.arcs().map(|(i, j)| 0.5 * (gamma[i] - gamma[j]).powi(2)).sum::<f64>();
+        let steady = last_step(mission).is_none() && v_l_at_the_end(case) == mission.speed.at(Time::ZERO).v_l;
+        let start = Some(start.sqrt()).filter(|_| steady);
+        Some(Ball { fleet: Coupled::new(law.a1, law.a2, &vehicles)?, delta: f64::sqrt(delta), pushed, start })
+    }
+
+    /// `alone` is the rate that ‖e‖ would have with α₂ = 0.
+    fn words(&self, graph: &Graph, alone: f64) -> Option<String> {
+        let (rate, end) = (self.fleet.rate(graph)?, self.fleet.apart_in_the_end(graph, self.pushed)?);
+        let bound = match self.start.and_then(|start| self.fleet.apart_after(graph, self.delta, start, 0.0)) {
+            Some(at_first) => format!("‖e‖ ≤ {at_first:.1} at first and {end:.3} in the end"),
+            None => format!("‖e‖ ≤ {end:.3} in the end"),
+        };
+        Some(format!(
+            "all errors together decay at ≥ {rate:.5} 1/s into a ball, {bound}; with α₂ = 0 ‖e‖ would at {alone:.5} 1/s"
+        ))
+    }
+
+    /// The largest part of its bound that ‖e‖ reached.
+    fn share(&self, graph: &Graph, summary: &Summary) -> Option<f64> {
+        let series = &summary.fleet.coordination.series;
+        let part = |(t, norm): (&f64, &f64)| Some(norm / self.fleet.apart_after(graph, self.delta, self.start?, *t)?);
+        let parts: Option<Vec<f64>> = series.t_s.iter().zip(&series.norm).map(part).collect();
+        parts?.into_iter().max_by(f64::total_cmp)
     }
 }
 
