@@ -52,7 +52,8 @@
 //! ([`Dynamic::rate_on`](super::lemma_4_6::Dynamic::rate_on)); path following makes them slower or faster.
 //!
 //! A root says nothing of how large an error may grow before it decays. [`transient`] does: for a rate r below it, P with
-//! (B + rI)'P + P(B + rI) = −I makes x'Px e^(2rt) fall, whence |x(t)| ≤ √cond(P) e^(−rt)|x(0)|.
+//! (B + rI)'P + P(B + rI) = −W makes x'Px e^(2rt) fall, whence |x(t)| ≤ √cond(P) e^(−rt)|x(0)|, for every W > 0. W = Q(λ) is a good one: P is
+//! then near I/2 where V_c by itself falls fast enough.
 
 use nalgebra::{DMatrix, DVector, Matrix4, SymmetricEigen, Vector4};
 
@@ -184,18 +185,21 @@ impl OnALine {
     }
 }
 
-/// c with |x(t)| ≤ c e^(−rate t)|x(0)| for x' = Ax, by the module's head; `None` unless every root of A is to the left of −`rate`.
+/// c with |x(t)| ≤ c e^(−rate t)|x(0)| for x' = Ax, by the module's head, with W = −(A + A')/2 if that is positive definite, else I; `None`
+/// unless every root of A is to the left of −`rate`.
 pub fn transient(a: &DMatrix<f64>, rate: f64) -> Option<f64> {
     let n = a.nrows();
     let shifted = a + DMatrix::identity(n, n) * rate;
     if !eigenvalues(&shifted)?.iter().all(|root| root.re < 0.0) {
         return None;
     }
-    // A'P + PA = −I as a system of n² equations.
+    // A'P + PA = −W as a system of n² equations.
     let identity = DMatrix::<f64>::identity(n, n);
+    let lost = (a + a.transpose()) * -0.5;
+    let weight = if lost.symmetric_eigenvalues().min() > 0.0 { lost } else { identity.clone() };
     let transposed = shifted.transpose();
     let system = identity.kronecker(&transposed) + transposed.kronecker(&identity);
-    let right = DVector::from_iterator(n * n, identity.iter().map(|entry| -entry));
+    let right = DVector::from_iterator(n * n, weight.iter().map(|entry| -entry));
     let p = DMatrix::from_column_slice(n, n, system.lu().solve(&right)?.as_slice());
     let spectrum = SymmetricEigen::new((&p + p.transpose()) * 0.5).eigenvalues;
     Some((spectrum.max() / spectrum.min()).sqrt()).filter(|factor| factor.is_finite() && spectrum.min() > 0.0)
