@@ -36,10 +36,11 @@ pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
     let file: Option<MissionFile> = toml::from_str(&mission.text).ok();
     let name = |i: usize| mission.vehicles[i].id.clone();
     let guarantee = theory::guarantee(mission);
+    let biases = theory::predicted_biases(mission, v_l);
     Facts {
         mission: mission.name.clone(),
         description: mission.about.clone(),
-        vehicles: (0..mission.vehicles.len()).map(|i| vehicle(mission, file.as_ref(), i)).collect(),
+        vehicles: (0..mission.vehicles.len()).map(|i| vehicle(mission, file.as_ref(), i, biases[i])).collect(),
         links: mission.links.iter().map(|link| (name(link.from), name(link.to))).collect(),
         message_bytes: (0..mission.vehicles.len()).map(|i| bytes_on_air(mission, i)).max().unwrap_or(0),
         duration_s: mission.end.secs(),
@@ -51,7 +52,6 @@ pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
         guaranteed_factor: guarantee.and_then(|g| g.factor),
         formation_speed_at_the_end: Some(v_l),
         predicted_speed: theory::predicted_speed(mission, v_l),
-        predicted_along_bias_m: mission.predicted_along_bias(0),
         symbol: if is_chapter_4(mission) { "γ".to_string() } else { "ξ".to_string() },
         xi_unit: String::new(),
         spatial: mission.vehicles.iter().any(|v| matches!(v.model, ModelChoice::UnderactuatedAuv(_))),
@@ -88,7 +88,7 @@ fn is_chapter_4(mission: &Mission) -> bool {
     )
 }
 
-fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> VehicleFacts {
+fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize, bias: Option<f64>) -> VehicleFacts {
     let plan = &mission.vehicles[index];
     let travelled = mission.nominal_factor() * mission.speed.distance(mission.end);
     let (from, to) = (plan.start.xi.min(plan.start.xi + travelled), plan.start.xi.max(plan.start.xi + travelled));
@@ -113,6 +113,7 @@ fn vehicle(mission: &Mission, file: Option<&MissionFile>, index: usize) -> Vehic
         path: path.to_string(),
         planned,
         message_bytes: Some(bytes_on_air(mission, index)),
+        predicted_along_bias_m: bias,
     }
 }
 

@@ -262,13 +262,13 @@ fn an_auxiliary_state_takes_up_what_coordination_does_to_path_following() {
     let flown = Flown::file("eq-4-59");
     assert!(!flown.says_a_scalar() && flown.disagreement() < 1e-3, "{}", flown.disagreement());
     // Erratum 4.14: α_2 does not vanish, and the fleet travels at 0.491 instead of 0.5.
-    let predicted = flown.mission.excited_speed().expect("theory has a word on it");
+    let predicted = flown.summary.fleet.predicted_speed.expect("theory has a word on it");
     assert_close("erratum 4.14", predicted, 0.491, 1e-3);
     for vehicle in &flown.summary.vehicles {
         assert_close(&vehicle.id, vehicle.steady_speed, predicted, 1e-3);
     }
-    assert_eq!(flown.summary.fleet.predicted_speed, Some(predicted));
-    assert_eq!(flown.theory("Theorem 4.8").holds, Some(true));
+    let row = flown.theory("Theorem 4.8");
+    assert!(row.holds == Some(true) && row.predicted.contains("at ≥ 0.04598 1/s into a ball"), "{row:?}");
 }
 
 #[test]

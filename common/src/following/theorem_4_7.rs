@@ -99,19 +99,24 @@ impl Gains {
         auv.parameters().mass.x * (delta1 - surplus * (1.0 + k_e / k_phi)) / (k_e + 1.0 / k_phi)
     }
 
+    /// α₂ in steady motion along a straight path whose |p'| is `stretch` \[m\], `surplus` being γ̇ − v_n \[1/s\], in which it is affine:
+    /// −|p'|(e₁ + k_e m₁₁φ₁) with e₁ of [`Gains::predicted_bias_at`] and φ₁ = −(e₁/m₁₁ + k_e|p'| surplus)/k_φ.
+    #[doc(alias = "α_2")]
+    pub fn steady_alpha_2(&self, auv: &Auv, surplus: f64, stretch: f64) -> f64 {
+        let Gains { k_e, k_phi, .. } = *self;
+        let m = auv.parameters().mass.x;
+        let e = self.predicted_bias_at(auv, surplus * stretch);
+        let phi = -(e / m + surplus * k_e * stretch) / k_phi;
+        -stretch * (e + phi * m * k_e)
+    }
+
     /// The steady rate of the target under (4.53) \[1/s\]: α₂ does not vanish when δ ≠ 0, so type I travels slower
     /// than its reference (erratum 4.14). `stretch` is |p'|; a straight path is assumed.
     ///
     /// α₂ = a₀ + a₁ x is affine in x = γ̇ − v_n, and η = γ̇ − v_r = −α₂/k_η gives x.
     pub fn predicted_rate_type_1(&self, auv: &Auv, v_n: f64, v_r: f64, stretch: f64) -> f64 {
-        let alpha_2 = |x: f64| {
-            let Gains { k_e, k_phi, .. } = *self;
-            let m = auv.parameters().mass.x;
-            let e = self.predicted_bias_at(auv, x * stretch);
-            let phi = -(e / m + x * k_e * stretch) / k_phi;
-            -stretch * (e + phi * m * k_e)
-        };
-        let (a_0, a_1) = (alpha_2(0.0), alpha_2(1.0) - alpha_2(0.0));
+        let [a_0, at_one] = [0.0, 1.0].map(|x| self.steady_alpha_2(auv, x, stretch));
+        let a_1 = at_one - a_0;
         v_n + (v_r - v_n - a_0 / self.k_eta) / (1.0 + a_1 / self.k_eta)
     }
 }

@@ -14,6 +14,7 @@ mod speed;
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
 
 pub use fault::{Collector, Fault, Faults};
@@ -25,7 +26,7 @@ pub use speed::SpeedProfile;
 
 use crate::coordination::FleetLaw;
 use crate::craft::{Craft, Limits};
-use crate::following::theorem_4_7::Gains;
+use crate::following::theorem_4_7::{Gains, TargetRate, Theorem47};
 use crate::graph::Graph;
 use crate::graph::switching::Switching;
 use crate::network::Medium;
@@ -35,6 +36,7 @@ use crate::talk::speaker::acknowledgements;
 use crate::talk::trigger::Trigger;
 use crate::theory::{PathFollowing, Underactuated};
 use crate::time::{Span, Time};
+use crate::vehicle::auv::Auv;
 use crate::vehicle::environment::{Disturbances, Environment};
 use crate::wire::state::{Acknowledgement, CoordinationState, Word};
 
@@ -201,80 +203,73 @@ impl Mission {
         build::nominal_factor(&self.law_choice)
     }
 
-    /// The steady along-path error that the design vector δ of Theorem 4.7 leaves \[m\] (erratum 4.12), for a vehicle that
-    /// has one.
-    pub fn predicted_along_bias(&self, vehicle: usize) -> Option<f64> {
-        let plan = &self.vehicles[vehicle];
+    /// The gains and the vehicle of Theorem 4.7, for a vehicle under that law.
+    pub fn theorem_47(&self, vehicle: usize) -> Option<(Gains, Auv)> {
+        let plan = self.vehicles.get(vehicle)?;
         match (&plan.model, &plan.following) {
             (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) => {
-                Some(build::auv_gains(gains).predicted_bias(&build::auv(model).ok()?))
+                Some((build::auv_gains(gains), build::auv(model).ok()?))
             }
             _ => None,
         }
     }
 
-    /// The constants of Assumption 4.1 that a vehicle has with Theorem 4.7 and (4.53), which do for type II too; `None` under other
-    /// path-following laws. |p'| and |p''| are the largest at 201 points of the path that is to be flown.
-    pub fn path_following_of_type_1(&self, vehicle: usize) -> Option<PathFollowing> {
+    /// W_3 of (4.49) of a vehicle at the start, for targets that are to go at the mission's first v_n; `None` under other path-following
+    /// laws than that of Theorem 4.7.
+    #[doc(alias = "W_3")]
+    pub fn lyapunov_at_start(&self, vehicle: usize) -> Option<f64> {
+        let (gains, auv) = self.theorem_47(vehicle)?;
+        let VehiclePlan { path, start, .. } = self.vehicles.get(vehicle)?;
+        let law = Theorem47::new(gains, auv).ok()?;
+        let v_n = self.nominal_factor() * self.speed.at(Time::ZERO).v_l;
+        let rate = TargetRate { nominal: v_n, nominal_dot: 0.0, actual: v_n };
+        Some(law.lyapunov(&law.evaluate(&build::auv_state(start), &path.at(start.xi), rate)))
+    }
+
+    /// Whether a vehicle starts on the tangent of its path where its target is, and points along it: to a micrometre and a microradian.
+    pub fn starts_along_its_path(&self, vehicle: usize) -> bool {
+        const SAME: f64 = 1e-6;
+        let Some(VehiclePlan { path, start, .. }) = self.vehicles.get(vehicle) else { return false };
+        let point = path.at(start.xi);
+        let Some(tangent) = point.d1.try_normalize(0.0) else { return false };
+        let error = Vector3::from(start.position) - point.p;
+        let heading = Vector3::new(start.yaw.cos(), start.yaw.sin(), 0.0);
+        (error - tangent * error.dot(&tangent)).norm() <= SAME && (heading - tangent).norm() <= SAME
+    }
+
+    /// What theory needs to know of a vehicle under Theorem 4.7 and of its path; `None` under other path-following laws. |p'| and |p''| are
+    /// the largest at 201 points of the path that is to be flown.
+    pub fn underactuated(&self, vehicle: usize) -> Option<Underactuated> {
         const STEPS: u32 = 200;
-        let plan = &self.vehicles[vehicle];
-        let (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(law)) =
-            (&plan.model, &plan.following)
-        else {
-            return None;
-        };
-        let auv = build::auv(model).ok()?;
-        let parameters = auv.parameters();
+        let (gains, auv) = self.theorem_47(vehicle)?;
+        let (plan, parameters) = (self.vehicles.get(vehicle)?, auv.parameters());
         let way = self.nominal_factor() * self.speed.distance(self.end);
         let points = (0..=STEPS).map(|step| plan.path.at(plan.start.xi + way * f64::from(step) / f64::from(STEPS)));
         let (stretch, bend) =
             points.fold((0.0f64, 0.0f64), |(d1, d2), point| (d1.max(point.d1.norm()), d2.max(point.d2.norm())));
-        let underactuated = Underactuated {
+        Some(Underactuated {
             mass: (parameters.mass.min(), parameters.mass.max()),
             inertia: (parameters.inertia.min(), parameters.inertia.max()),
-            gains: [law.k_e, law.k_phi, law.k_z, law.k_eta],
+            gains: [gains.k_e, gains.k_phi, gains.k_z, gains.k_eta],
             fastest: self.speed.fastest(),
             stretch,
             bend,
-        };
-        underactuated.type_1()
+        })
+    }
+
+    /// The constants of Assumption 4.1 that a vehicle has with Theorem 4.7 and (4.53), which do for type II too; `None` under other
+    /// path-following laws.
+    pub fn path_following_of_type_1(&self, vehicle: usize) -> Option<PathFollowing> {
+        self.underactuated(vehicle)?.type_1()
     }
 
     /// |δ_1| of a vehicle under Theorem 4.7, and what it must exceed so that the matrix keeps its rank at every nominal speed of
     /// the mission (erratum 4.11) \[m/s\].
     pub fn rank_margin(&self, vehicle: usize) -> Option<(f64, f64)> {
-        let plan = &self.vehicles[vehicle];
-        match (&plan.model, &plan.following) {
-            (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) => {
-                let (gains, auv) = (build::auv_gains(gains), build::auv(model).ok()?);
-                let fastest = self.speed.fastest() * self.nominal_factor();
-                let stretch = build::largest_stretch(plan.path.as_ref());
-                Some((gains.delta1.abs(), Gains::smallest_delta1(&auv, fastest, stretch)))
-            }
-            _ => None,
-        }
-    }
-
-    /// The rate at which α_2 lets the fleet travel in the end under (4.59), where it is fed back and does not vanish
-    /// (erratum 4.14): v_L less what δ costs, for vehicles with the gains of the first. At rest z = (Lγ + α_2)/(a_1 + a_2), so
-    /// η = −α_2 a_2/(a_1(a_1 + a_2)): that of type I with k_η = a_1(a_1 + a_2)/a_2.
-    pub fn excited_speed(&self) -> Option<f64> {
-        self.excited_speed_at(self.speed.at(self.end).v_l)
-    }
-
-    /// [`excited_speed`](Mission::excited_speed) when the formation speed is this one.
-    pub fn excited_speed_at(&self, v_l: f64) -> Option<f64> {
-        let file::LawChoice::Auxiliary(law) = &self.law_choice else { return None };
-        let plan = self.vehicles.first()?;
-        let (file::ModelChoice::UnderactuatedAuv(model), file::FollowingChoice::Theorem47(gains)) =
-            (&plan.model, &plan.following)
-        else {
-            return None;
-        };
-        let mut gains = build::auv_gains(gains);
-        gains.k_eta = law.a1 * (law.a1 + law.a2) / law.a2;
-        let stretch = plan.path.at(plan.start.xi).r();
-        Some(gains.predicted_rate_type_1(&build::auv(model).ok()?, v_l, v_l, stretch))
+        let (gains, auv) = self.theorem_47(vehicle)?;
+        let fastest = self.speed.fastest() * self.nominal_factor();
+        let stretch = build::largest_stretch(self.vehicles.get(vehicle)?.path.as_ref());
+        Some((gains.delta1.abs(), Gains::smallest_delta1(&auv, fastest, stretch)))
     }
 
     /// Whether every vehicle can fly at this formation speed.

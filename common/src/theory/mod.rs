@@ -16,7 +16,9 @@
 //! | known delay | this project | agreement at v_L iff kλ_max τ < π/2, with its rate | [`known_delay`] |
 //! | late information | Theorem 4.3, Lemmas 4.4, 4.5; errata 4.1–4.3 | agreement at v_L* = v_L/(1 + kτ) | [`delay`] |
 //! | how fast, on a fixed network | (4.40) | the rightmost root | [`delay_rate`] |
-//! | coordination with a state of its own | Lemmas 4.2, 4.6, 4.7, Theorems 4.8, 4.9, (4.63)–(4.66); errata 4.19, 4.20 | V at (1 − α)λ_c − αλ_d, norms at half | [`lemma_4_6`] |
+//! | coordination with a state of its own | Lemmas 4.2, 4.6, 4.7, Theorem 4.9, (4.63)–(4.66); errata 4.19, 4.20 | V at (1 − α)λ_c − αλ_d, norms at half | [`lemma_4_6`] |
+//! | the same with α_2, on a fixed network | Theorem 4.8, (4.59)–(4.61); result xii of docs/errata.md | all errors at μ into a ball; to zero at an exact rate for equal vehicles on lines | [`theorem_4_8`] |
+//! | what δ leaves | errata 4.3, 4.12, 4.14; results iv, v, xiii | the fleet's rate, every vehicle's bias, how far unequal vehicles stay apart | [`steady_motion`] |
 //! | all of these over a run as measured | Definitions 4.3, 4.4, Theorems 4.4, 4.5, Lemma 4.7 | covered, not covered and by how much, or a defect | [`monitor`] |
 //!
 //! Quadratic functions such as V decay at twice the rate of the norms of errors (erratum 4.4). Rates of norms are what
@@ -40,8 +42,10 @@ pub mod polynomial;
 pub mod proposition_3_4;
 pub mod proposition_3_6;
 pub mod proposition_3_8;
+pub mod steady_motion;
 pub mod theorem_4_4;
 pub mod theorem_4_5;
+pub mod theorem_4_8;
 
 /// What a statement says of a mission or of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]

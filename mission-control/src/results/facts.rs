@@ -38,8 +38,6 @@ pub struct Facts {
     pub formation_speed_at_the_end: Option<f64>,
     /// The formation speed that theory predicts for the fleet \[units of ξ per s\].
     pub predicted_speed: Option<f64>,
-    /// The mean along-track error that theory predicts \[m\].
-    pub predicted_along_bias_m: Option<f64>,
     /// The symbol of the coordination state in figures: `ξ`, or `γ` in space; `ξ` if empty.
     pub symbol: String,
     /// Unit of the coordination state, empty if it has none.
@@ -84,6 +82,8 @@ pub struct VehicleFacts {
     pub way: Way,
     /// Size of one of its messages \[bytes\], if not the fleet's.
     pub message_bytes: Option<u64>,
+    /// The mean along-track error in which theory says that it ends \[m\].
+    pub predicted_along_bias_m: Option<f64>,
 }
 
 impl Facts {

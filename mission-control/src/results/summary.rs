@@ -497,7 +497,7 @@ fn vehicle(track: &Track<'_>, all: &[Track<'_>], facts: &Facts, said: &BTreeMap<
         path_settled_s,
         on_path_s: settling_time(&t_s, &errors, PATH_THRESHOLD_M),
         along_mean_m: mean(steady.iter().map(|row| row.e_along_m)),
-        predicted_along_bias_m: facts.predicted_along_bias_m,
+        predicted_along_bias_m: planned.and_then(|vehicle| vehicle.predicted_along_bias_m),
         cross_rms_m: rms(steady.iter().map(|row| row.e_cross_m)),
         heading_rms_rad: rms(steady.iter().map(|row| row.psi_e_rad)),
         alone_fraction: mean(rows.iter().map(|row| f64::from(u8::from(row.neighbours == 0)))),

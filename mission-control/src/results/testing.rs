@@ -40,6 +40,7 @@ pub(super) fn facts(spatial: bool) -> Facts {
         path: if spatial { format!("helix-{}", index + 1) } else { format!("circle-{}", index + 1) },
         way: Default::default(),
         message_bytes: (index == 2).then_some(44),
+        predicted_along_bias_m: Some(0.0),
         planned: (0..=200).map(|step| path(f64::from(step) * 2.0, index, spatial)).collect(),
     });
     Facts {
@@ -57,7 +58,6 @@ pub(super) fn facts(spatial: bool) -> Facts {
         least_rate: None,
         guaranteed_factor: Some(1.3),
         predicted_speed: Some(0.5),
-        predicted_along_bias_m: Some(0.0),
         symbol: if spatial { "γ".into() } else { "ξ".into() },
         xi_unit: String::new(),
         spatial,

@@ -1,15 +1,15 @@
 //! What theory says of every mission: its graph, its losses, its speed, and what path following leaves.
 
 use common::mission::Mission;
-use common::mission::file::{FollowingChoice, FollowingType, LawChoice};
+use common::mission::file::LawChoice;
 use common::time::Span;
 
 use super::Case;
 use super::delayed::told_truly;
 use super::graph::graph_facts;
 use super::learned_speeds::stuck_at_the_end;
-use super::surroundings::Disturbances;
-use super::switching::moves_as_told;
+use super::premises::minds_no_hull;
+use super::steady_motion::{is_excited, motion};
 use super::talk::speed_factor;
 use crate::results::TheoryRow;
 
@@ -113,22 +113,27 @@ pub(super) fn connected_in_mean(case: &Case<'_>) -> TheoryRow {
 /// The rate at which theory says the fleet travels in the end \[units of ξ per s\]; `None` where it says nothing: without
 /// coordination, where vehicles cannot agree, or disturbed.
 pub fn predicted_speed(mission: &Mission, v_l: f64) -> Option<f64> {
-    let disturbed = Disturbances::of(mission, None);
+    rate_in_the_end(&Case::new(mission, None), v_l).ok()
+}
+
+/// The same, or why there is none.
+pub(super) fn rate_in_the_end(case: &Case<'_>, v_l: f64) -> Result<f64, String> {
+    let (mission, disturbed) = (case.mission, &case.disturbances);
     match travels(mission) {
-        Travel::Nowhere => None,
-        Travel::With(_, rate) if moves_as_told(mission) || disturbed.only_failures() => Some(rate),
-        Travel::Told if moves_as_told(mission) || disturbed.is_empty() => {
-            let told = || (!has_type_1(mission)).then(|| Some(speed_factor(mission)? * v_l)).flatten();
-            mission.excited_speed_at(v_l).or_else(told)
-        }
-        _ => None,
+        Travel::Nowhere => Err("nothing makes the vehicles agree".into()),
+        Travel::With(_, rate) if minds_no_hull(mission) || disturbed.only_failures() => Ok(rate),
+        Travel::Told if minds_no_hull(mission) || disturbed.is_empty() => match is_excited(mission) {
+            true => Ok(motion(case, v_l)?.rate),
+            false => speed_factor(mission).map(|factor| factor * v_l).ok_or_else(|| "delays differ".into()),
+        },
+        _ => Err("disturbed".into()),
     }
 }
 
-/// Whether a target has dynamics of its own, (4.53), which δ slows down (erratum 4.14).
-fn has_type_1(mission: &Mission) -> bool {
-    let of = |choice: &FollowingChoice| matches!(choice, FollowingChoice::Theorem47(gains) if gains.kind == FollowingType::I);
-    mission.vehicles.iter().any(|plan| of(&plan.following))
+/// v_L in force at the end.
+pub(super) fn v_l_at_the_end(case: &Case<'_>) -> f64 {
+    let planned = case.mission.speed.at(case.mission.end).v_l;
+    case.summary.and_then(|s| s.fleet.formation_speed_at_the_end).unwrap_or(planned)
 }
 
 /// What sets the fleet's speed in the end.
@@ -154,16 +159,20 @@ fn travels(mission: &Mission) -> Travel {
         // All others learn the speed of one that cannot learn theirs (2.41), (2.43).
         (LawChoice::LeaderFollower(law), [one]) if leads(&law.leader, one.0) => follow(one),
         (LawChoice::Gateway(_) | LawChoice::GatewayIntegral(_), [one]) => follow(one),
-        _ if moves_as_told(mission) => Travel::Told,
+        _ if minds_no_hull(mission) => Travel::Told,
         _ => Travel::Nowhere,
     }
 }
 
 pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
     let mission = case.mission;
-    let planned = mission.speed.at(mission.end).v_l;
-    let v_l = case.summary.and_then(|s| s.fleet.formation_speed_at_the_end).unwrap_or(planned);
-    let slowed = has_type_1(mission) && mission.excited_speed_at(v_l).is_none();
+    let v_l = v_l_at_the_end(case);
+    let excited = is_excited(mission);
+    let why_not = excited.then(|| motion(case, v_l).err()).flatten();
+    let holds = match (excited, mission.law_delay()) {
+        (true, _) => Some(why_not.is_none() && case.disturbances.is_empty()),
+        (false, tau) => tau.map(|tau| told_truly(mission, tau)),
+    };
     let (name, condition, value) = match (mission.law_delay(), travels(mission)) {
         (_, Travel::Nowhere) => {
             let why = if stuck_at_the_end(mission).is_empty() { "no coordination" } else { "a failure (see above)" };
@@ -174,8 +183,13 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
             "one vehicle stuck to the end, whose speed the others learn".to_string(),
             format!("{} is stuck", mission.vehicles[failed].id),
         ),
-        _ if mission.excited_speed_at(v_l).is_some() => {
-            ("Fleet speed left by δ under (4.59) (erratum 4.14)", "α₂ at rest".to_string(), format!("v_L = {v_l:.4}"))
+        _ if excited => {
+            let name = match mission.law_choice {
+                LawChoice::Auxiliary(_) => "Fleet speed left by δ under (4.59) (erratum 4.14, result v)",
+                _ => "Fleet speed left by δ, type I (4.53) (erratum 4.14, result v)",
+            };
+            let why = why_not.as_ref().map_or(String::new(), |why| format!("; not predicted: {why}"));
+            (name, "α₂ at rest: |p'| constant, v_L constant, undisturbed".to_string(), format!("v_L = {v_l:.4}{why}"))
         }
         (Some(tau), _) => (
             "Fleet speed v_L* = v_L/(1 + kτ) (after Lemma 4.4)",
@@ -187,36 +201,12 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
     TheoryRow {
         name: name.into(),
         condition,
-        value: if slowed { format!("{value}; type I, whose targets δ slows down (erratum 4.14)") } else { value },
-        holds: mission.law_delay().map(|tau| told_truly(mission, tau) && !slowed),
-        predicted: predicted_speed(mission, v_l).map_or("–".into(), |speed| format!("{speed:.5} 1/s")),
+        value,
+        holds,
+        predicted: predicted_speed(mission, v_l)
+            .filter(|_| !excited || holds == Some(true))
+            .map_or("–".into(), |speed| format!("{speed:.5} 1/s")),
         measured: case.measured(|s| format!("{:.5} 1/s", s.fleet.steady_speed)),
         ..TheoryRow::default()
     }
-}
-
-pub(super) fn bias(case: &Case<'_>) -> Option<TheoryRow> {
-    let mission = case.mission;
-    let first = (0..mission.vehicles.len()).find(|&i| mission.predicted_along_bias(i).is_some())?;
-    let bias = mission.predicted_along_bias(first)?;
-    let margins = (0..mission.vehicles.len()).filter_map(|i| mission.rank_margin(i));
-    let tightest = margins.min_by(|(a, b), (c, d)| (a - b).total_cmp(&(c - d)));
-    // At another rate than v_n it is another one (docs/errata.md, result iv).
-    let nominal = !has_type_1(mission) && mission.excited_speed().is_none();
-    let holds = nominal && case.disturbances.is_empty() && tightest.is_some_and(|(size, least)| size > least);
-    Some(TheoryRow {
-        name: "Along-path bias left by δ (Theorem 4.7, erratum 4.12)".into(),
-        condition: "δ₁ < 0, |δ₁| > |v_n| |p'| max|m_ii − m₁₁|/m₁₁, so that the matrix B keeps its rank; targets that go at v_n; undisturbed"
-            .into(),
-        value: format!(
-            "{}{}{}",
-            tightest.map_or("–".into(), |(size, least)| format!("|δ₁| = {size} > {least:.4} m/s")),
-            if nominal { "" } else { "; α₂ keeps targets at another rate (erratum 4.14)" },
-            if case.disturbances.is_empty() { "" } else { "; disturbed" }
-        ),
-        holds: Some(holds),
-        predicted: if holds { format!("{bias:.3} m") } else { "–".into() },
-        measured: case.measured(|s| s.vehicles.get(first).map_or("–".into(), |v| format!("{:.3} m", v.along_mean_m))),
-        ..TheoryRow::default()
-    })
 }

@@ -7,7 +7,8 @@
 //! | what | source | file |
 //! |---|---|---|
 //! | what statements ask for beyond their network | – | `surroundings.rs` |
-//! | graph, losses, speed, bias: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
+//! | graph, losses, speed: said of every mission | sections 3.1, 4.2 | `fleet.rs` |
+//! | rate, bias and distances that δ leaves | Theorem 4.7, results iv, v, xiii | `steady_motion.rs` |
 //! | matrices of the graph, all graphs that can be | section 3.1, Lemma 4.1 | `graph.rs` |
 //! | two vehicles on lines | Lemma 1.1 | `introduction.rs` |
 //! | learned speeds: leader, gateway, row | sections 2.2 to 2.4 | `learned_speeds.rs` |
@@ -37,6 +38,7 @@ mod network;
 mod premises;
 mod so_far;
 mod solutions;
+mod steady_motion;
 mod surroundings;
 mod switching;
 mod talk;
@@ -53,6 +55,7 @@ pub use figures::figures;
 pub use fleet::predicted_speed;
 pub use graph::graph_facts;
 pub use so_far::{SoFar, so_far};
+pub use steady_motion::predicted_biases;
 pub use talk::speed_factor;
 pub use watched::{envelope_over, guarantee_of_flight};
 
@@ -190,7 +193,8 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
     }
     rows.extend(together::path_following(&case));
     rows.push(fleet::speed(&case));
-    rows.extend(fleet::bias(&case));
+    rows.extend(steady_motion::apart(&case));
+    rows.extend(steady_motion::bias(&case));
     rows.extend(watched::row(&case));
     rows
 }

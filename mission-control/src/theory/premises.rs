@@ -146,6 +146,11 @@ pub(super) fn moves_as_told(mission: &Mission) -> bool {
     not_as_told(mission).is_none()
 }
 
+/// Whether what happens to the hulls does not reach the targets: they move as told, and α_2 is not fed back (4.59).
+pub(super) fn minds_no_hull(mission: &Mission) -> bool {
+    moves_as_told(mission) && !matches!(mission.law_choice, LawChoice::Auxiliary(_))
+}
+
 /// The premise of type II, if a target does not move at exactly the rate the law asks for.
 pub(super) fn not_as_told(mission: &Mission) -> Option<Premise> {
     let asks = "targets that move as told (type II)";

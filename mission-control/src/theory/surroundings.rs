@@ -10,7 +10,7 @@ use common::theory::proposition_3_4::PathRates;
 use common::time::Time;
 
 use super::Case;
-use super::switching::moves_as_told;
+use super::premises::minds_no_hull;
 use crate::results::{Summary, TheoryRow};
 
 /// Places along the way at which R_i is looked at.
@@ -88,6 +88,14 @@ fn is_trimmed(vehicle: &VehiclePlan, xi: &[f64]) -> bool {
         let same = |a: f64, b: f64| (a - b).abs() <= 1e3 * SAME * a.abs().max(b.abs()).max(1e-6);
         joints.iter().any(|joint| (low..=high).contains(joint))
             || (same(a.r(), b.r()) && same(a.curvature(), b.curvature()))
+    })
+}
+
+/// Whether the way of every vehicle is a straight line, gone along at one |p'|.
+pub(super) fn on_lines(mission: &Mission) -> bool {
+    legs(mission).iter().all(|(vehicle, xi)| {
+        let mut along = xi.iter().map(|xi| vehicle.path.at(*xi).d1);
+        along.next().is_some_and(|first| along.all(|d1| (d1 - first).norm() <= SAME * first.norm()))
     })
 }
 
@@ -175,8 +183,8 @@ pub(super) fn undisturbed_but_for_failures(case: &Case<'_>, row: TheoryRow) -> T
 }
 
 fn with_premises(case: &Case<'_>, mut row: TheoryRow, failures_matter: bool) -> TheoryRow {
-    // A target that moves just as told does not mind what happens to the hull.
-    if row.holds.is_none() || moves_as_told(case.mission) {
+    // A target that moves just as told does not mind what happens to the hull, unless α₂ tells coordination.
+    if row.holds.is_none() || minds_no_hull(case.mission) {
         return row;
     }
     let what = if failures_matter { "undisturbed" } else { "otherwise undisturbed" };

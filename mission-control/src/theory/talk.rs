@@ -88,7 +88,7 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
 }
 
 /// The delay that all messages on all links have, if they have.
-fn common_delay(mission: &Mission) -> Option<Span> {
+pub(super) fn common_delay(mission: &Mission) -> Option<Span> {
     let first = mission.links.first()?.fixed_delay()?;
     mission.every_message_takes(first).then_some(first)
 }

@@ -94,13 +94,18 @@ pub(in crate::mission) fn craft(
             let chosen = auv_gains(gains);
             chosen.validate(&auv, fastest * nominal_factor, largest_stretch(plan.path.as_ref()))?;
             let law = Theorem47::new(chosen, auv)?;
-            let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, start.yaw);
-            let mut state = AuvState::at_rest(Vector3::from(start.position), attitude);
-            state.velocity.x = start.speed;
-            Ok(Box::new(AuvCraft::new(law, motion, nominal_factor, plan.path.clone(), state, start.xi)))
+            Ok(Box::new(AuvCraft::new(law, motion, nominal_factor, plan.path.clone(), auv_state(&start), start.xi)))
         }
         _ => Err("the following law does not fit the vehicle".to_string()),
     }
+}
+
+/// The state in which an underactuated vehicle starts: level, without turning.
+pub(in crate::mission) fn auv_state(start: &Start) -> AuvState {
+    let attitude = UnitQuaternion::from_euler_angles(0.0, 0.0, start.yaw);
+    let mut state = AuvState::at_rest(Vector3::from(start.position), attitude);
+    state.velocity.x = start.speed;
+    state
 }
 
 /// The law of chapter 2 of a choice, for a path that begins with this curvature, and the gain of its speed loop.
