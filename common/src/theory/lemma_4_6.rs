@@ -420,4 +420,49 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_spectra_are_the_outermost_of_all_graphs_that_occur() {
+        // In any order: an edge has 2, no edge 0.
+        let (pair, none) = (Graph::from_edges(3, &[(0, 1)]), Graph::empty(3));
+        for graphs in
+            [[Graph::complete(3), pair.clone(), none.clone()], [none.clone(), pair.clone(), Graph::complete(3)]]
+        {
+            let spectra = Spectra::of(&graphs).expect("one is connected");
+            assert!((spectra.disconnected.expect("two are not") - 2.0).abs() < 1e-9, "{spectra:?}");
+            assert!((spectra.connected.0 - 3.0).abs() < 1e-9 && (spectra.connected.1 - 3.0).abs() < 1e-9);
+        }
+        let never = Spectra::of(&[Graph::complete(3), none]).expect("one is connected").disconnected;
+        assert!(never.is_some_and(|most| most.abs() < 1e-9), "{never:?}");
+        assert_eq!(Spectra::of(&[Graph::complete(3)]).expect("connected").disconnected, None);
+        assert!(Dynamic::new(f64::INFINITY, 1.0, &all_graphs(3)).is_none());
+    }
+
+    proptest! {
+        /// (4.65) by its definition: the largest eigenvalue of A(λ)X + XA(λ)' against X, at all λ that occur.
+        #[test]
+        fn a_certificate_says_exactly_what_its_x_shows(
+            a_1 in 0.1..4.0f64, a_2 in 0.1..4.0f64, x in 0.1..9.0f64, rho in -0.95..0.95f64, size in 0.2..5.0f64
+        ) {
+            let y = rho * x.sqrt();
+            let x = Matrix2::new(1.0, y, y, x) * size;
+            let growth = |fleet: &Dynamic, lambda: f64| {
+                let a = fleet.block(lambda);
+                let inverse = x.cholesky().expect("positive definite").l().try_inverse().expect("so is its root");
+                let form = inverse * (a * x + x * a.transpose()) * inverse.transpose();
+                SymmetricEigen::new((form + form.transpose()) * 0.5).eigenvalues.max()
+            };
+            let fleet = Dynamic::new(a_1, a_2, &all_graphs(3)).expect("some graphs are connected");
+            let found = fleet.certify(&x).expect("positive definite");
+            let tolerance = 1e-7 * (1.0 + found.lambda_c.abs() + found.lambda_d);
+            let connected = growth(&fleet, 1.0).max(growth(&fleet, 3.0));
+            prop_assert!((found.lambda_c + connected).abs() < tolerance, "{:?} {}", found, connected);
+            let others = growth(&fleet, 0.0).max(growth(&fleet, 2.0)).max(0.0);
+            prop_assert!((found.lambda_d - others).abs() < tolerance, "{:?} {}", found, others);
+            // Where every graph is connected nothing ever grows.
+            let always = Dynamic::new(a_1, a_2, &[Graph::complete(3)]).expect("connected");
+            prop_assert_eq!(always.certify(&x).map(|found| found.lambda_d), Some(0.0));
+            prop_assert_eq!(fleet.certify(&-x), None);
+        }
+    }
 }

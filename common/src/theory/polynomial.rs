@@ -130,6 +130,7 @@ mod tests {
         assert!(!is_hurwitz(&[1.0, 1.0, 1.0, 1.0]) && !is_hurwitz(&[1.0, 1.0, 1.0, 2.0]));
         assert!(!is_hurwitz(&[1.0, -1.0]) && !is_hurwitz(&[]) && !is_hurwitz(&[0.0, 1.0]) && is_hurwitz(&[4.0]));
         assert!(!is_hurwitz(&[1.0, f64::INFINITY]) && !is_hurwitz(&[1.0, 0.0]));
+        assert!(!is_hurwitz(&[0.0]) && !is_hurwitz(&[f64::INFINITY]) && !is_hurwitz(&[f64::NAN]));
     }
 
     #[test]
@@ -142,6 +143,8 @@ mod tests {
         assert!(close(slowest(&[1.0, 3.0, 2.0]), 1.0, 1));
         assert!(close(slowest(&[1.0, 1.0, 1.0]), 0.5, 1), "a pair of complex roots is two different ones");
         assert_eq!(slowest(&[0.0, 1.0]), None);
+        // Four digits of each, however slow: 0.001 and 0.00105 are two.
+        assert!(close(slowest(&[1.0, 2.05e-3, 1.05e-6]), 1e-3, 1));
     }
 
     proptest! {
