@@ -272,6 +272,8 @@ mod tests {
             assert_eq!(demand_of(law.vehicle(1).as_mut(), SpeedReference::default(), &own, heard), 0.0);
         }
         assert!(FleetLaw::says(&law, 0).is_some() && law.vehicle(1).says(&own) == Some(0.5));
+        let reference = SpeedReference { v_l: 9.0, v_l_dot: 0.0 };
+        assert_eq!(law.vehicle(1).neighbour_rate(reference, 0.25), 0.25, "a neighbour goes on as it says");
         assert!(Decentralised::new(0, 0.0, 1.0, Weighing::Plain).is_err());
     }
 }

@@ -198,10 +198,13 @@ mod tests {
         assert!((next - first + 0.1 * (5.0 * 0.3 + 2.0 * 4.0 * 0.75 + 2.0 * 0.2)).abs() < 1e-12);
         let mut spoke = law.vehicle(2);
         spoke.demand(reference, &own, &[Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }]);
+        // Not being told v_L, they take others to move as they do themselves.
+        assert_eq!([hub.neighbour_rate(reference, 9.0), spoke.neighbour_rate(reference, 9.0)], [0.25; 2]);
         spoke.advance(0.1);
         assert!((spoke.says(&own).unwrap() - 0.05).abs() < 1e-15, "δe grows while the gateway is ahead");
         assert_eq!((hub.says(&own), law.says(0).is_some(), law.says(2).is_some()), (None, false, true));
-        assert!(Gateway::new(0, 5.0, GAINS).unwrap().vehicle(1).says(&own).is_none());
+        let plain = Gateway::new(0, 5.0, GAINS).unwrap();
+        assert!(plain.says(1).is_none() && plain.vehicle(1).says(&own).is_none());
     }
 
     #[test]

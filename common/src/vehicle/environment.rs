@@ -222,6 +222,12 @@ mod tests {
         assert_eq!(at(0.0), Vector3::new(0.1, 0.0, 0.0));
         assert!((at(10.0) - Vector3::new(0.1, 0.2, 0.0)).norm() < 1e-15);
         assert!((at(30.0) - Vector3::new(0.1, -0.2, 0.0)).norm() < 1e-15);
+        // φ = 30° at the start, a quarter turn 40/3 s later.
+        let early = Current { tide: Some(Tide { phase: TAU / 12.0, ..tide }), ..current };
+        assert!(
+            (early.at(Time::ZERO).y - 0.1).abs() < 1e-15
+                && (early.at(Time::from_secs(40.0 / 6.0)).y - 0.2).abs() < 1e-9
+        );
         let mut environment = environment(Disturbances { current: Some(current), ..Disturbances::default() });
         let drift = environment.conditions(Time::from_secs(10.0), 100).drift(0.5).expect("flows");
         assert!((drift - Vector3::new(0.05, 0.1, 0.0)).norm() < 1e-15);
