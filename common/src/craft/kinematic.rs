@@ -276,6 +276,44 @@ mod tests {
         assert!(seen.e_cross.abs() < 1e-3 && seen.xi < -10.0, "{seen:?}");
     }
 
+    #[test]
+    fn limits_are_of_the_rates_at_which_speed_and_heading_change() {
+        // From rest along a line at 0.3 rad, wanting 1 m/s and a quarter turn at most: 0.5 m/s² and 0.2 rad/s, either way.
+        let of = |limits, y: f64| {
+            let line = Line::new(Vector3::zeros(), 0.3, 2.0).unwrap();
+            let (sin, cos) = 0.3f64.sin_cos();
+            let mut craft = craft(line, -y * sin, y * cos).limited(limits, 0.0, 0.3);
+            craft.command(REFERENCE, Demand::Rate(0.5));
+            let before = craft.observe();
+            craft.advance(0.4, 4);
+            let after = craft.observe();
+            (after.speed - before.speed, after.attitude[0] - before.attitude[0], craft.warnings()[0].count)
+        };
+        let none = Limits::NONE;
+        for side in [3.0, -3.0] {
+            let (faster, turned, late) = of(Limits { acceleration: 0.5, turn_rate: 0.2, ..none }, side);
+            assert!((faster - 0.2).abs() < 1e-12 && (turned + 0.08 * side.signum()).abs() < 1e-12 && late == 1);
+        }
+        // One limit is enough to be limited, and it does not bind the other.
+        let (faster, turned, late) = of(Limits { turn_rate: 0.2, ..none }, 3.0);
+        assert!((faster - 1.0).abs() < 1e-12 && (turned + 0.08).abs() < 1e-12 && late == 1, "{faster} {turned}");
+        let (faster, turned, late) = of(Limits { acceleration: 0.5, ..none }, 3.0);
+        assert!((faster - 0.2).abs() < 1e-12 && turned < -0.5 && late == 1, "{faster} {turned}");
+        assert_eq!(of(Limits { acceleration: 99.0, turn_rate: 99.0, ..none }, 3.0).2, 0, "what is reached is not late");
+    }
+
+    #[test]
+    fn a_state_that_is_no_number_is_told_of() {
+        let sound = || craft(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap(), 0.0, 1.0);
+        let mut stuck = sound();
+        stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+        let mut lost = sound();
+        lost.position.y = f64::NAN;
+        let mut turned = sound();
+        turned.held.heading = f64::INFINITY;
+        assert!(sound().is_sound() && !stuck.is_sound() && !lost.is_sound() && !turned.is_sound());
+    }
+
     fn exposed(craft: &mut KinematicCraft, conditions: Conditions, periods: usize) {
         for _ in 0..periods {
             craft.expose(&conditions);

@@ -308,6 +308,7 @@ mod tests {
     use crate::path::circle::{Circle, Turn};
     use crate::path::helix::Helix;
     use crate::path::line::Line;
+    use crate::path::sinusoid::Sinusoid;
     use crate::vehicle::environment::InstrumentErrors;
 
     const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
@@ -483,6 +484,87 @@ mod tests {
     }
 
     #[test]
+    fn the_law_steers_with_what_limited_forces_make_of_v_t() {
+        // Neither, the surge force, or both cut; or the surge stuck and the sway force cut.
+        for (force, stuck_speed, cut) in [
+            (f64::INFINITY, None, [false, false]),
+            (30.0, None, [true, false]),
+            (10.0, None, [true, true]),
+            (10.0, Some(0.4), [true, true]),
+        ] {
+            let state = State { x: 5.2, y: 0.3, heading: 1.2, surge: 0.4, sway: 0.1, turn_rate: 0.1 };
+            let mut craft = craft(circle(Turn::Left), WEAVING, state).limited(Limits { force, ..Limits::NONE });
+            craft.expose(&Conditions { stuck_speed, ..Conditions::default() });
+            craft.command(REFERENCE, Demand::Rate(0.05));
+            let input = craft.held.input;
+            assert_eq!([input.surge.abs() == force, input.sway.abs() == force], cut, "{input:?}");
+            // v̇_t by the equations of motion.
+            let held = |t: f64, x: &SVector<f64, 6>, tau: &Input, p: &Parameters| {
+                let mut rate = model(t, x, tau, p);
+                rate[3] = if stuck_speed.is_some() { 0.0 } else { rate[3] };
+                rate
+            };
+            let v_t = |dt: f64| {
+                craft.flow(&State::from_vector(advance(held, &state.to_vector(), &input, &PARAMETERS, dt, 1))).v_t
+            };
+            let v_dot = (v_t(1e-5) - v_t(-1e-5)) / 2e-5;
+            let (flow, r) = (craft.flow(&state), state.turn_rate);
+            let slip = craft.law.slip(flow.beta, &craft.wanted());
+            let motion = Motion { v: flow.v_t, v_dot, r, slip };
+            let e = craft.errors(&state, &flow);
+            let steered = |motion: &Motion| {
+                let steering = craft.law.steer(&e, motion, &Bend::of(&craft.target), craft.sense);
+                PARAMETERS.m_r * (steering.r_dot - PARAMETERS.f_r(flow.v_t, flow.beta, r))
+            };
+            assert!(
+                (input.torque - steered(&motion)).abs() < 1e-5 * input.torque.abs(),
+                "{force} {input:?} {}",
+                steered(&motion)
+            );
+            let other = Motion { v_dot: v_dot + 0.01, ..motion };
+            assert!((input.torque - steered(&other)).abs() > 1e-3 * input.torque.abs(), "else nothing is tested");
+        }
+    }
+
+    #[test]
+    fn what_is_measured_is_the_state_with_every_error() {
+        let state = State { x: 1.0, y: 2.0, heading: 0.3, surge: 0.4, sway: 0.2, turn_rate: 0.5 };
+        let mut craft = craft(circle(Turn::Left), WEAVING, state);
+        let errors = InstrumentErrors {
+            position: Vector3::new(0.125, 0.25, 9.0),
+            heading: 0.0625,
+            velocity: Vector3::new(0.5, 0.375, 9.0),
+            spin: Vector3::new(9.0, 9.0, 0.75),
+        };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        let wanted = State { x: 1.125, y: 2.25, heading: 0.3625, surge: 0.9, sway: 0.575, turn_rate: 1.25 };
+        assert!((craft.measured().to_vector() - wanted.to_vector()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn own_rate_of_r_is_that_of_the_target() {
+        let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
+        let mut craft = craft(path, WEAVING, State { x: 0.3, y: 0.1, heading: 0.5, surge: 0.4, ..State::default() });
+        craft.place_target(0.3);
+        let own = craft.own(REFERENCE);
+        craft.command(REFERENCE, Demand::Rate(0.1));
+        craft.advance(1e-6, 1);
+        assert!(((craft.target.r() - own.r) / 1e-6 - own.r_dot).abs() < 1e-5 && own.r_dot.abs() > 0.05, "{own:?}");
+    }
+
+    #[test]
+    fn a_state_that_is_no_number_is_told_of() {
+        let sound = || craft(circle(Turn::Left), WEAVING, State { x: 5.0, ..State::default() });
+        let mut nowhere = sound();
+        nowhere.place_target(f64::NAN);
+        let mut stuck = sound();
+        stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+        let mut held = sound();
+        held.held.input.sway = f64::NAN;
+        assert!(sound().is_sound() && !nowhere.is_sound() && !stuck.is_sound() && !held.is_sound());
+    }
+
+    #[test]
     fn what_is_no_number_is_refused_and_counted() {
         let mut craft = craft(circle(Turn::Left), WEAVING, State { x: 5.0, surge: 0.4, ..State::default() });
         craft.command(REFERENCE, Demand::Rate(0.1));
@@ -496,6 +578,7 @@ mod tests {
         craft.command(REFERENCE, Demand::Rate(0.1));
         assert!(craft.held.input == held && craft.is_sound());
         assert_eq!(craft.warnings()[2], Warning { what: REFUSED, count: 4 });
+        assert_eq!(craft.refused(), 4);
     }
 
     proptest! {

@@ -294,4 +294,39 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn losses_can_be_spread_evenly() {
+        // A quarter of the time, every fourth slot.
+        let signals = signals(&STAR, allowance(0.25, 10.0, 1.0), 100.0);
+        let even = measured(&signals, &STAR, &signals.starts()[2], 100.0);
+        assert_eq!((even.loss_time(), even.longest_outage()), (Span::from_secs(25.0), Span::from_secs(1.0)));
+        assert_eq!(even.most_lost_in(Span::from_secs(4.0)), Span::from_secs(1.0));
+    }
+
+    #[test]
+    fn what_is_connected_with_fewer_links_counts_only_if_they_are_among_them() {
+        // 1–2 and 2–3 two-way, and 3 hears 1: each two of the three connect them, and none of these within another.
+        let arcs = [(0, 1), (1, 0), (1, 2), (2, 1), (2, 0)];
+        let signals = signals(&arcs, allowance(0.5, 10.0, 1.0), 100.0);
+        let sizes: Vec<usize> =
+            signals.graphs().iter().filter(|graph| graph.can_agree()).map(|g| g.arcs().count()).collect();
+        assert_eq!(sizes.iter().sum::<usize>(), 4 + 3 + 3, "{sizes:?}");
+    }
+
+    #[test]
+    fn of_few_links_all_sets_are_looked_at_and_of_many_those_next_to_all_and_none() {
+        // A row is connected only whole.
+        let of = |n: usize| {
+            let arcs: Vec<(usize, usize)> = (1..n).flat_map(|i| [(i, i - 1), (i - 1, i)]).collect();
+            let signals = Signals::new(n, &arcs, allowance(0.5, 10.0, 1.0), Time::from_secs(9.0)).expect("admitted");
+            let mut links: Vec<usize> = signals.graphs()[1..].iter().map(|graph| graph.arcs().count() / 2).collect();
+            links.sort();
+            (signals.graphs()[0].arcs().count() / 2, links)
+        };
+        let (whole, others) = of(11);
+        assert_eq!((whole, others.len()), (10, (1 << 10) - 1));
+        let (whole, others) = of(12);
+        assert_eq!((whole, others), (11, [vec![0], vec![1; 11], vec![10; 11]].concat()));
+    }
 }

@@ -345,8 +345,24 @@ mod tests {
         assert_eq!((run.loss_time(), run.length()), (s(3.0), s(10.0)));
         assert_eq!((run.shortest_outage(), run.longest_outage()), (Some(s(2.0)), s(2.0)));
         assert_eq!((run.dwell(), run.connected_in_mean()), (Some(s(2.0)), Some(s(2.0))));
+        // α is taken into [0, 1], T_0 is not negative.
+        assert_eq!((run.t_0(1.0), run.t_0(1.5)), (s(2.0), s(2.0)));
+        assert_eq!((run.t_0(-0.5), run.alpha(s(-1.0))), (run.t_0(0.0), run.alpha(Span::ZERO)));
+        assert_eq!((run.most_lost_in(s(-1.0)), run.most_lost_in(s(99.0))), (Span::ZERO, s(3.0)));
         run.advance(at(12.0));
         assert_eq!((run.longest_outage(), run.connected_in_mean()), (s(3.0), Some(s(3.0))));
+    }
+
+    #[test]
+    fn the_shortest_outage_is_the_shortest_of_those_that_ended() {
+        let mut run = Connectivity::new();
+        for (second, connected) in
+            [(0.0, false), (3.0, true), (4.0, false), (4.5, true), (6.0, false), (8.0, true), (9.0, false)]
+        {
+            run.connected(at(second), connected);
+        }
+        run.advance(at(9.25));
+        assert_eq!((run.shortest_outage(), run.longest_outage()), (Some(s(0.5)), s(3.0)));
     }
 
     #[test]
