@@ -205,6 +205,26 @@ mod tests {
         assert_eq!((hub.says(&own), law.says(0).is_some(), law.says(2).is_some()), (None, false, true));
         let plain = Gateway::new(0, 5.0, GAINS).unwrap();
         assert!(plain.says(1).is_none() && plain.vehicle(1).says(&own).is_none());
+        // Without the extra integrator what a distance that stays adds is the same in every period.
+        let mut spoke = plain.vehicle(1);
+        let ahead = [Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }];
+        let asked = [(); 3].map(|()| {
+            let Demand::Forward(asked) = spoke.demand(reference, &own, &ahead) else { panic!() };
+            spoke.advance(0.1);
+            asked
+        });
+        assert!((asked[2] - 2.0 * asked[1] + asked[0]).abs() < 1e-12 && asked[1] > asked[0], "{asked:?}");
+        // What is no number is not heard, of either kind.
+        let strange = [
+            Neighbour { vehicle: 1, xi: f64::NAN, ..Neighbour::default() },
+            Neighbour { vehicle: 2, xi: 0.5, scalar: f64::NAN, ..Neighbour::default() },
+        ];
+        let mut hub = law.vehicle(0);
+        for _ in 0..2 {
+            let Demand::Forward(asked) = hub.demand(reference, &own, &strange) else { panic!() };
+            assert!(asked.is_finite());
+            hub.advance(0.1);
+        }
     }
 
     #[test]

@@ -332,6 +332,8 @@ mod tests {
         let fleet = example_4_1(1.6);
         let good = fleet.verdict(0.75);
         assert!(good.holds && good.norm_rate.is_some_and(|rate| rate > 0.0), "{good:?}");
+        assert_eq!(good.norm_rate, fleet.best(0.75).map(|best| 0.5 * best.rate_of_v(0.75)), "half of that of V");
+        assert!(fleet.largest_lambda_c(-0.1).is_none(), "V may not fall without connection");
         let never = fleet.verdict(1.0);
         assert_eq!((never.holds, never.norm_rate), (false, None));
         assert!(Dynamic::new(1.0, 1.0, &[Graph::empty(3)]).is_none(), "never connected");
@@ -409,14 +411,18 @@ mod tests {
             run.advance(t);
             let alpha = run.loss_fraction();
             let best = fleet.best(alpha).expect("connected at times");
-            let (rate, overshoot) = (0.5 * best.rate_of_v(alpha), best.overshoot(alpha, run.t_0(alpha)));
-            let mut state = DVector::from_fn(2 * n, |_, _| stream.uniform(-3.0, 3.0));
-            let (start, mut t) = (norm(&state), 0.0);
-            for (graph, lasts) in &phases {
-                state = (closed(graph, a_1, a_2) * lasts.secs()).exp() * state;
-                t += lasts.secs();
-                let promised = overshoot * (-rate * t).exp() * start;
-                prop_assert!(norm(&state) <= promised * (1.0 + 1e-9) + 1e-9, "{} > {} at {}", norm(&state), promised, t);
+            // And by any other X, under which V may grow without connection.
+            let other = fleet.certify(&Matrix2::new(1.0, 0.0, 0.0, stream.uniform(0.5, 4.0))).expect("positive definite");
+            let begin = DVector::from_fn(2 * n, |_, _| stream.uniform(-3.0, 3.0));
+            for certificate in [best, other] {
+                let (rate, overshoot) = (0.5 * certificate.rate_of_v(alpha), certificate.overshoot(alpha, run.t_0(alpha)));
+                let (mut state, start, mut t) = (begin.clone(), norm(&begin), 0.0);
+                for (graph, lasts) in &phases {
+                    state = (closed(graph, a_1, a_2) * lasts.secs()).exp() * state;
+                    t += lasts.secs();
+                    let promised = overshoot * (-rate * t).exp() * start;
+                    prop_assert!(norm(&state) <= promised * (1.0 + 1e-9) + 1e-9, "{} > {} at {}", norm(&state), promised, t);
+                }
             }
         }
     }
@@ -463,6 +469,34 @@ mod tests {
             let always = Dynamic::new(a_1, a_2, &[Graph::complete(3)]).expect("connected");
             prop_assert_eq!(always.certify(&x).map(|found| found.lambda_d), Some(0.0));
             prop_assert_eq!(fleet.certify(&-x), None);
+        }
+    }
+
+    #[test]
+    fn lemma_4_7_in_closed_form() {
+        // λ_c = 2, λ_d = ½: at α = ¼ V decays at 1.5 − 0.125, α < 4/5 is borne, and X̂ of condition 4 doubles a norm.
+        let known = Certificate { lambda_c: 2.0, lambda_d: 0.5, x: Matrix2::new(1.0, 0.0, 0.0, 4.0) };
+        assert!((known.rate_of_v(0.25) - 1.375).abs() < 1e-12 && (known.alpha_limit() - 0.8).abs() < 1e-12);
+        assert!(known.rate_of_v(0.799) > 0.0 && known.rate_of_v(0.801) < 0.0, "the limit is where the rate is zero");
+        assert!((known.overshoot(0.25, Span::from_secs(2.0)) - 2.0 * 1.875f64.exp()).abs() < 1e-9);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn no_other_x_promises_more_than_the_best(
+            a_1 in 0.2..4.0f64, a_2 in 0.2..4.0f64, alpha in 0.0..0.95f64,
+            others in prop::collection::vec((-4.0..4.0f64, -0.99..0.99f64), 200),
+        ) {
+            let fleet = Dynamic::new(a_1, a_2, &all_graphs(3)).expect("some graphs are connected");
+            let best = fleet.best(alpha).expect("there is one").rate_of_v(alpha);
+            prop_assert!(best >= fleet.calm().rate_of_v(alpha));
+            for (ln_x, rho) in others {
+                let x = (2.0 * (a_1 + a_2).ln() + ln_x).exp();
+                let other = fleet.certify(&Matrix2::new(1.0, rho * x.sqrt(), rho * x.sqrt(), x)).expect("positive definite");
+                prop_assert!(other.rate_of_v(alpha) <= best + 0.02 * best.abs(), "{} {}", other.rate_of_v(alpha), best);
+            }
         }
     }
 }

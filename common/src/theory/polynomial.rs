@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(add(&[1.0, 0.0, 0.0], &[2.0, 3.0]), [1.0, 2.0, 3.0]);
         assert_eq!(shifted_power(2.0, 3), [1.0, 6.0, 12.0, 8.0]);
         assert_eq!(product(&[&[2.0], &[1.0, 1.0], &[1.0, -1.0]]), [2.0, 0.0, -2.0]);
-        assert!(multiply(&[], &[1.0]).is_empty());
+        assert!(multiply(&[], &[1.0]).is_empty() && multiply(&[1.0, 2.0], &[]).is_empty());
     }
 
     #[test]
