@@ -327,7 +327,9 @@ mod tests {
         let refused = craft.refused();
         fly(&mut craft, 0.5, f64::NAN, 1.0);
         craft.command(SpeedReference::default(), Demand::Acceleration(1.0));
-        assert_eq!(craft.refused(), refused + 21);
+        assert_eq!((craft.refused(), Craft::refused(&craft)), (refused + 21, refused + 21));
+        let counts: Vec<u64> = craft.warnings().iter().map(|warning| warning.count).collect();
+        assert_eq!(counts, [craft.limited(), craft.saturated(), craft.refused()]);
         assert!(craft.is_sound());
     }
 
@@ -390,6 +392,14 @@ mod tests {
         craft.command(SpeedReference { v_l: 0.5, v_l_dot: 0.0 }, Demand::Rate(0.4));
         craft.advance(0.5, 4);
         assert!((craft.observe().xi - (70.483 + 0.2)).abs() < 1e-12);
+        // The same in one step but for rounding and the method; none counts as one.
+        let [none, one, four] = [0, 1, 4].map(|substeps| {
+            let mut other = self::craft(1, TargetMotion::TypeI, 1.0);
+            other.command(SpeedReference { v_l: 0.5, v_l_dot: 0.0 }, Demand::Rate(0.4));
+            other.advance(0.1, substeps);
+            other.state.position
+        });
+        assert!(none == one && one != four && (one - four).norm() < 1e-3, "{one} {four}");
         assert!(craft.eta != 0.0);
         craft.place_target(12.0);
         assert_eq!((craft.observe().xi, craft.eta), (12.0, 0.0));

@@ -303,6 +303,37 @@ mod tests {
     }
 
     #[test]
+    fn braking_is_limited_as_well_and_the_way_is_that_of_the_substeps() {
+        // From 1 m/s along the line at rest: 0.9 m/s after 0.2 s, by steps of 0.05 s at 0.975, 0.95, 0.925 and 0.9 m/s.
+        let line = Line::new(Vector3::zeros(), 0.3, 2.0).unwrap();
+        let mut craft = craft(line, 0.0, 0.0).limited(Limits { acceleration: 0.5, ..Limits::NONE }, 1.0, 0.3);
+        craft.command(REFERENCE, Demand::Rate(0.0));
+        craft.advance(0.2, 4);
+        let seen = craft.observe();
+        assert!((seen.speed - 0.9).abs() < 1e-12 && (seen.xi - 0.05 * 3.75 / 2.0).abs() < 1e-12, "{seen:?}");
+        assert!((seen.xi_rate - 0.45).abs() < 1e-12 && seen.attitude == [0.3, 0.0, 0.0], "{seen:?}");
+        // No substeps count as one, in which it brakes before it moves.
+        craft.advance(0.2, 0);
+        assert!((craft.observe().xi - seen.xi - 0.2 * 0.8 / 2.0).abs() < 1e-12);
+        // Stuck, a speed that is not the wanted one is nobody's fault.
+        craft.expose(&Conditions { stuck_speed: Some(0.8), ..Conditions::default() });
+        craft.advance(0.2, 1);
+        assert_eq!(craft.warnings()[0].count, 2);
+    }
+
+    #[test]
+    fn errors_are_made_up_for_as_far_as_they_are_seen() {
+        // A speed that is told 0.1 too fast is driven 0.1 too slow; to the right of the line the distance is no less.
+        let mut craft = craft(Line::new(Vector3::zeros(), 0.3, 2.0).unwrap(), 0.3, -0.5);
+        let errors = InstrumentErrors { velocity: Vector3::new(0.1, 9.0, 9.0), ..InstrumentErrors::default() };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        craft.command(REFERENCE, Demand::Rate(0.5));
+        let seen = craft.observe();
+        assert!((seen.speed - 0.9).abs() < 1e-12 && seen.e_cross < 0.0 && seen.e_norm == -seen.e_cross, "{seen:?}");
+        assert!((seen.xi_rate - 0.45 * (seen.attitude[0] - 0.3).cos()).abs() < 1e-12 && seen.e_along == 0.0);
+    }
+
+    #[test]
     fn a_state_that_is_no_number_is_told_of() {
         let sound = || craft(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap(), 0.0, 1.0);
         let mut stuck = sound();

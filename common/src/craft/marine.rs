@@ -392,10 +392,18 @@ mod tests {
             craft(line(), SideSlip::NONE, State::default()).limited(Limits { force: 1.0, torque: 1.0, ..Limits::NONE });
         fly(&mut weak, 0..50);
         assert!(weak.warnings()[0].count > 0 && weak.observe().speed < 0.01);
+        // One effort at its limit is enough to be counted, whichever.
+        for (force, torque) in [(f64::INFINITY, 1.0), (10.0, f64::INFINITY)] {
+            let start = State { x: 5.0, surge: 0.4, sway: 0.1, heading: FRAC_PI_2, ..State::default() };
+            let mut weak = craft(circle(Turn::Left), WEAVING, start).limited(Limits { force, torque, ..Limits::NONE });
+            // What is wanted is the speed it has, so that the surge force is small and the sway force is not.
+            weak.command(REFERENCE, Demand::Rate(start.surge.hypot(start.sway) / 5.0));
+            assert_eq!(weak.warnings()[0].count, 1, "{:?}", weak.held.input);
+        }
         let mut adrift = craft(line(), SideSlip::NONE, State::default());
         let errors = InstrumentErrors { position: Vector3::y(), ..InstrumentErrors::default() };
         adrift.conditions = Conditions {
-            current: Some(Vector3::y()),
+            current: Some(Vector3::new(-3.0, 1.0, 0.0)),
             errors: Some(errors),
             stuck_speed: Some(0.2),
             ..adrift.conditions
@@ -403,6 +411,8 @@ mod tests {
         fly(&mut adrift, 0..1);
         let seen = adrift.observe();
         assert!((seen.e_cross - 0.02).abs() < 1e-6 && adrift.state.surge == 0.2, "{seen:?}");
+        assert!((seen.position[0] - (0.2 - 3.0) * 0.02).abs() < 1e-6, "{seen:?}");
+        assert_eq!(seen.attitude, [adrift.state.heading, 0.0, 0.0]);
         assert!(adrift.held.input.torque < 0.0, "it thinks that it is to the left");
         let law = Proposition33::new(Gains::default(), 1.0).unwrap();
         let helix = Arc::new(Helix::new(5.0, 9.0, 0.0, 0.1, 0.0).unwrap());

@@ -670,7 +670,7 @@ mod tests {
             velocity: Vector3::new(0.05, 0.0, 0.0),
             ..InstrumentErrors::default()
         };
-        let (current, stuck_speed) = (Some(Vector3::new(0.0, -0.3, 0.0)), Some(0.25));
+        let (current, stuck_speed) = (Some(Vector3::new(0.5, -0.3, 0.0)), Some(0.25));
         craft.expose(&Conditions { current, errors: Some(errors), stuck_speed, ..Conditions::default() });
         // The laws see v = 0.3 and a vehicle at the left; the record does not.
         assert!((craft.own(REFERENCE).eta - 0.2).abs() < 1e-15);
@@ -680,6 +680,7 @@ mod tests {
         craft.advance(0.02, 1);
         let seen = craft.observe();
         assert!((seen.e_cross + 0.006).abs() < 1e-6 && seen.speed == 0.25, "{seen:?}");
+        assert!((seen.position[0] - 0.75 * 0.02).abs() < 1e-6 && seen.attitude == [craft.state.heading, 0.0, 0.0]);
     }
 
     /// V_p of (3.18), with what the law knows of v̇ where the speed is stuck.

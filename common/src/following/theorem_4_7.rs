@@ -675,7 +675,7 @@ pub(crate) mod tests {
                 let nominal = (1.0 - left) * 4.0 * 0.3 / (3.0 * 0.8);
                 law.evaluate(&state, &point, TargetRate { nominal, nominal_dot: 0.0, actual: nominal }).limited
             };
-            assert!(!limited(0.06) && limited(0.04) && limited(-0.5), "{y} {z}");
+            assert!(!limited(0.055) && limited(0.045) && limited(-0.5), "{y} {z}");
         }
         let equal = Theorem47::new(Gains::default(), of_mass(4.0, 4.0)).expect("valid");
         let fast = TargetRate { nominal: 9.0, nominal_dot: 0.0, actual: 9.0 };

@@ -211,15 +211,16 @@ mod tests {
 
     #[test]
     fn it_is_searched_for_over_all_of_the_path_and_half_a_turn_either_way() {
-        // From far away along a line of a kilometre per unit either way.
+        // From anywhere along a line of ten kilometres either way, from one end to the other.
         let line = Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
         for x in [-900.0, -1.0, 1.0, 900.0] {
             assert!((Foot::locate(&line, Vector2::new(x, 5.0), 0.0).xi - x).abs() < 1e-9, "{x}");
         }
-        // Beyond the centre, to either side, at 2 m per unit of ξ on a circle of 2 m and of 4 m.
-        for radius in [2.0, 4.0] {
+        assert!((Foot::locate(&line, Vector2::new(9000.0, 5.0), -9000.0).xi - 9000.0).abs() < 1e-9);
+        // Beyond the centre, to either side, at half a radian per unit of ξ.
+        for radius in [1.0, 4.0] {
             for turn in [Turn::Left, Turn::Right] {
-                let path = Circle::new(Vector3::zeros(), radius, turn, 0.0, 2.0).unwrap();
+                let path = Circle::new(Vector3::zeros(), radius, turn, 0.0, 0.5).unwrap();
                 let start = Foot::locate(&path, Vector2::new(0.9 * radius, 0.0), 0.0);
                 for angle in [-2.5f64, -1.8, 1.8, 2.5] {
                     let position = 0.7 * radius * Vector2::new(angle.cos(), angle.sin());

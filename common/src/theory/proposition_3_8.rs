@@ -111,6 +111,9 @@ mod tests {
         let least = least_eigenvalue(&Graph::complete(2), &[1.0, 2.0], &[1.0, 3.0]).expect("sizes fit");
         assert!((least - (19.0 - 146f64.sqrt()) / 2.0).abs() < 1e-9, "{least}");
         assert_eq!(least_eigenvalue(&star, &[1.0; 3], &[1.0; 2]), None);
+        // The star with R = (2, 1, 1): [12 −3 −3; −3 4 0; −3 0 4], with 4 and 8 ∓ √34.
+        let least = least_eigenvalue(&star, &[1.0; 3], &[2.0, 1.0, 1.0]).expect("sizes fit");
+        assert!((least - (8.0 - 34f64.sqrt())).abs() < 1e-9, "{least}");
     }
 
     #[test]

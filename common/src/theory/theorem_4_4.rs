@@ -375,9 +375,9 @@ mod tests {
             );
             assert!((two.overshoot(0.25, Span::from_secs(2.0)) - 2.25f64.exp()).abs() < 1e-9);
         }
-        // (4.19): λ_1λ_2 = 3 bears a product of drives below it, not above.
-        let driven = |drive_1| Interconnection { lambda_1: 3.0, lambda_2: 1.0, growth_2: 0.5, drive_1, drive_2: 1.0 };
-        assert!(driven(2.99).holds(0.0) && !driven(3.01).holds(0.0));
+        // (4.19): λ_1λ_2 = 6 bears a product of drives below it, not above.
+        let driven = |drive_1| Interconnection { lambda_1: 3.0, lambda_2: 2.0, growth_2: 0.5, drive_1, drive_2: 1.0 };
+        assert!(driven(5.99).holds(0.0) && !driven(6.01).holds(0.0));
         // A cascade goes at the rate of the slower of the two.
         let cascade = |lambda_1| Interconnection { lambda_1, lambda_2: 2.0, growth_2: 0.5, drive_1: 9.0, drive_2: 0.0 };
         assert!((cascade(3.0).rate(0.2) - 1.5).abs() < 1e-12 && (cascade(0.5).rate(0.2) - 0.5).abs() < 1e-12);

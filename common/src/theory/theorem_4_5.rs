@@ -268,6 +268,12 @@ mod tests {
             "{}",
             proven.overshoot
         );
+        // A tree of three has two edges, so that only the pieces 3 and 2 away count, and λ = 1.
+        let three = agreement(gains(&[0.5, 1.0, 2.0]), s(0.7), s(0.1)).expect("it dwells");
+        let (g, h) = (6.0 / (1.0 - (-1.2f64).exp()), 0.6f64.tanh());
+        let q_3 = 0.5 / (g.sqrt() + (6.0 * h * 5.0).sqrt()).powi(2);
+        assert!((three.rate - 0.5 * (1.0 + q_3).ln() / 0.9).abs() < 1e-12, "{}", three.rate);
+        assert_eq!(agreement(Gains { n: 1, k_m: 1.0, k_max: 1.0 }, s(0.7), s(0.1)), None, "nobody to agree with");
         // An odd number of pieces has its middle in one of them: N = 7, H = 4 as well.
         let odd = agreement(gains(&[0.5, 1.0, 2.0, 1.0]), s(0.6), s(0.1)).expect("it dwells");
         assert!((odd.rate - 0.5 * (1.0 + q).ln() / 0.8).abs() < 1e-12, "{}", odd.rate);

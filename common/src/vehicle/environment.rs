@@ -255,11 +255,21 @@ mod tests {
     }
 
     #[test]
+    fn no_number_is_used_twice() {
+        let disturbances = Disturbances { noise: Some(LEVELS), ..Disturbances::default() };
+        let mut one = environment(disturbances);
+        let mut all: Vec<f64> = (0..200).flat_map(|index| numbers(&mut one, index)).map(f64::abs).collect();
+        all.sort_by(f64::total_cmp);
+        assert!(all.windows(2).all(|pair| pair[1] - pair[0] > 1e-12 * pair[1]), "a place of the stream is read twice");
+    }
+
+    #[test]
     fn a_quiet_instrument_leaves_the_numbers_of_the_others_alone() {
         let with = |levels| environment(Disturbances { noise: Some(levels), ..Disturbances::default() });
         let of = |levels| with(levels).conditions(Time::ZERO, 3).errors.expect("noise");
         let quiet = of(NoiseLevels { position: 0.0, ..LEVELS });
         assert_eq!(quiet, InstrumentErrors { position: Vector3::zeros(), ..of(LEVELS) });
+        assert_eq!(of(NoiseLevels { heading: 0.0, ..LEVELS }), InstrumentErrors { heading: 0.0, ..of(LEVELS) });
     }
 
     #[test]
