@@ -219,12 +219,17 @@ mod tests {
             Neighbour { vehicle: 1, xi: f64::NAN, ..Neighbour::default() },
             Neighbour { vehicle: 2, xi: 0.5, scalar: f64::NAN, ..Neighbour::default() },
         ];
-        let mut hub = law.vehicle(0);
-        for _ in 0..2 {
-            let Demand::Forward(asked) = hub.demand(reference, &own, &strange) else { panic!() };
-            assert!(asked.is_finite());
-            hub.advance(0.1);
-        }
+        let [strange, nobody] = [&[Neighbour { scalar: 5.0, ..strange[0] }, strange[1]][..], &[]].map(|heard| {
+            let mut hub = law.vehicle(0);
+            [(); 3].map(|()| {
+                // The second one's ξ is a number, and counts in that.
+                let own = Own { xi: 0.5, ..own };
+                let demand = hub.demand(reference, &own, heard);
+                hub.advance(0.1);
+                demand
+            })
+        });
+        assert_eq!(strange, nobody);
     }
 
     #[test]

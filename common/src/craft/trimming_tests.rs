@@ -335,6 +335,12 @@ fn the_torque_goes_evenly_from_where_the_law_was_to_where_it_comes() {
     craft.command(REFERENCE, Demand::Acceleration(0.0));
     craft.advance(0.2, 2);
     assert_eq!((craft.warnings()[2].count, craft.refused()), (1, 0));
+    // From rest the law begins with none, so that only its end is.
+    let mut fresh = self::craft(circle(2.0, Turn::Left), decoupling(1.0), [2.5, 0.0, 1.6, 0.4]);
+    fresh.limits.torque = 1e-9;
+    fresh.command(REFERENCE, Demand::Acceleration(0.0));
+    fresh.advance(0.2, 2);
+    assert!(fresh.turning.from == 0.0 && fresh.warnings()[2].count == 1);
 }
 
 #[test]

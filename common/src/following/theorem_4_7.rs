@@ -504,9 +504,14 @@ pub(crate) mod tests {
     #[test]
     fn the_rates_of_the_wanted_turning_rates_are_exact() {
         let mut random = Stream::new(48, "wanted rates");
+        let mut limited = 0;
         for case in 0..100 {
-            let (closed, x) = random_loop(&mut random, TargetMotion::TypeI, 1.0);
-            let exact = closed.evaluate(&x).2.w_d_dot;
+            let (closed, mut x) = random_loop(&mut random, TargetMotion::TypeI, 1.0);
+            // Every other one far beyond the bound of δ, where a divisor is held.
+            x[15] *= if case % 2 == 0 { 1.0 } else { 20.0 };
+            let at = closed.evaluate(&x).2;
+            limited += u32::from(at.limited);
+            let exact = at.w_d_dot;
             for axis in 0..2 {
                 let wanted = |x: &Loop| x[11 + axis] - closed.evaluate(x).2.z_2[axis];
                 let measured = closed.derivative(&x, wanted);
@@ -514,6 +519,7 @@ pub(crate) mod tests {
                 assert!((measured - exact[axis]).abs() < 1e-6 * scale, "case {case}: {measured} {}", exact[axis]);
             }
         }
+        assert!((10..90).contains(&limited), "{limited}");
     }
 
     #[test]

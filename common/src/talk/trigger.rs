@@ -137,6 +137,10 @@ mod tests {
         let held = Trigger::new(Settings { jitter: 0.9, least_silence: s(9.0), ..settings() }).expect("sound");
         assert!((0..100).all(|seq| held.heartbeat(&mut stream, seq).is_some_and(|beat| beat >= s(9.0))));
         assert_eq!((plain.most_silence(), plain.patience()), (Some(s(10.0)), None));
+        let patient =
+            Trigger::new(Settings { most_silence: None, patience: Some(s(2.0)), ..settings() }).expect("sound");
+        assert_eq!((patient.most_silence(), patient.patience()), (None, Some(s(2.0))));
+        assert_eq!(patient.heartbeat(&mut stream, 7), None, "who waits for an answer needs none");
     }
 
     #[test]

@@ -475,7 +475,7 @@ mod tests {
     #[test]
     fn lemma_4_7_in_closed_form() {
         // λ_c = 2, λ_d = ½: at α = ¼ V decays at 1.5 − 0.125, α < 4/5 is borne, and X̂ of condition 4 doubles a norm.
-        let known = Certificate { lambda_c: 2.0, lambda_d: 0.5, x: Matrix2::new(1.0, 0.0, 0.0, 4.0) };
+        let known = Certificate { lambda_c: 2.0, lambda_d: 0.5, x: Matrix2::new(2.0, 0.0, 0.0, 8.0) };
         assert!((known.rate_of_v(0.25) - 1.375).abs() < 1e-12 && (known.alpha_limit() - 0.8).abs() < 1e-12);
         assert!(known.rate_of_v(0.799) > 0.0 && known.rate_of_v(0.801) < 0.0, "the limit is where the rate is zero");
         assert!((known.overshoot(0.25, Span::from_secs(2.0)) - 2.0 * 1.875f64.exp()).abs() < 1e-9);
@@ -498,5 +498,15 @@ mod tests {
                 prop_assert!(other.rate_of_v(alpha) <= best + 0.02 * best.abs(), "{} {}", other.rate_of_v(alpha), best);
             }
         }
+    }
+
+    #[test]
+    fn equation_4_66_where_neither_gain_nor_eigenvalue_is_one() {
+        // a_1 = 2, a_2 = 3 and eigenvalues from 2 to 5: λ_p = 10/7, x = 4·3·7/(8·(12 − 10/7)).
+        let spectra = Spectra { connected: (2.0, 5.0), disconnected: Some(3.0) };
+        let printed = Dynamic { a_1: 2.0, a_2: 3.0, spectra }.printed();
+        let x = 588.0 / 592.0;
+        assert!((printed.x[(1, 1)] - x).abs() < 1e-12 && (printed.lambda_c - 20.0 / 21.0).abs() < 1e-12, "{printed:?}");
+        assert!((printed.lambda_d - ((25.0 + x).sqrt() - 5.0)).abs() < 1e-12, "{printed:?}");
     }
 }
