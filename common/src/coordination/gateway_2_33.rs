@@ -198,6 +198,16 @@ mod tests {
         assert!((next - first + 0.1 * (5.0 * 0.3 + 2.0 * 4.0 * 0.75 + 2.0 * 0.2)).abs() < 1e-12);
         let mut spoke = law.vehicle(2);
         spoke.demand(reference, &own, &[Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }]);
+        // ζ moves by R(cS + dE), E with it: S = −½ held for two periods, E in the middle of them −0.025 and −0.075.
+        let mut moved = law.vehicle(2);
+        let asked = [(); 3].map(|()| {
+            let ahead = [Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }];
+            let Demand::Forward(asked) = moved.demand(reference, &own, &ahead) else { panic!() };
+            moved.advance(0.1);
+            asked
+        });
+        assert!((asked[1] - asked[0] - 0.1 * 2.0 * (4.0 * 0.5 + 0.025)).abs() < 1e-12, "{asked:?}");
+        assert!((asked[2] - asked[1] - 0.1 * 2.0 * (4.0 * 0.5 + 0.075)).abs() < 1e-12, "{asked:?}");
         // Not being told v_L, they take others to move as they do themselves.
         assert_eq!([hub.neighbour_rate(reference, 9.0), spoke.neighbour_rate(reference, 9.0)], [0.25; 2]);
         spoke.advance(0.1);

@@ -209,4 +209,20 @@ mod tests {
             (Some(0.5 * (MOST_REMEMBERED as f64 + 8.5)), None)
         );
     }
+
+    #[test]
+    fn every_neighbour_is_compared_with_its_own_instant() {
+        // Where it was 0.5 s and 1 s ago, at 0.5 per second: v_r = v_L − 0.2((0.75 − 0.7) + (0.5 − 0.2)).
+        let mut one = KnownDelay::new(0.2, 10.0).unwrap().vehicle(0);
+        let reference = SpeedReference { v_l: V_L, v_l_dot: 0.0 };
+        let at = |xi: f64| Own { xi, ..Own::default() };
+        for step in 0..20 {
+            one.demand(reference, &at(0.05 * f64::from(step)), &[]);
+            one.advance(0.1);
+        }
+        let heard =
+            [(0.7, 0.5), (0.2, 1.0)].map(|(said, age)| Neighbour { said, age, xi: 99.0, ..Neighbour::default() });
+        let Demand::Rate(asked) = one.demand(reference, &at(1.0), &heard) else { panic!() };
+        assert!((asked - (V_L - 0.2 * 0.35)).abs() < 1e-12, "{asked}");
+    }
 }

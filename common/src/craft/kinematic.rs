@@ -208,6 +208,7 @@ mod tests {
     use crate::following::line_of_sight::LineOfSight;
     use crate::path::circle::{Circle, Turn};
     use crate::path::line::Line;
+    use crate::path::spline::Spline;
     use crate::vehicle::environment::{Conditions, InstrumentErrors};
 
     const REFERENCE: SpeedReference = SpeedReference { v_l: 0.5, v_l_dot: 0.0 };
@@ -331,6 +332,15 @@ mod tests {
         let seen = craft.observe();
         assert!((seen.speed - 0.9).abs() < 1e-12 && seen.e_cross < 0.0 && seen.e_norm == -seen.e_cross, "{seen:?}");
         assert!((seen.xi_rate - 0.45 * (seen.attitude[0] - 0.3).cos()).abs() < 1e-12 && seen.e_along == 0.0);
+    }
+
+    #[test]
+    fn what_is_seen_of_it_is_where_it_is() {
+        let line = Line::new(Vector3::new(0.0, 0.0, -3.0), 0.0, 2.0).unwrap();
+        assert_eq!(craft(line, 1.0, 0.5).observe().position, [1.0, 0.5, -3.0]);
+        let climbing = Spline::by_length(vec![Vector3::zeros(), Vector3::new(3.0, 0.0, 1.0)], 1.0).unwrap();
+        let refused = KinematicCraft::new(Arc::new(climbing), LineOfSight::new(1.0).unwrap(), 0.0, 0.0);
+        assert!(refused.unwrap_err().contains("horizontal"));
     }
 
     #[test]

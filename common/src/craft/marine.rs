@@ -552,6 +552,19 @@ mod tests {
     }
 
     #[test]
+    fn what_is_seen_of_it_is_where_it_is() {
+        let line = Line::new(Vector3::new(0.0, 0.0, -3.0), 0.0, 2.0).unwrap();
+        let state = State { x: 1.0, y: 0.5, heading: 0.25, surge: 0.3, sway: 0.4, turn_rate: 0.0 };
+        let mut craft = craft(line, WEAVING, state);
+        craft.place_target(2.0);
+        let seen = craft.observe();
+        assert_eq!((seen.position, seen.attitude), ([1.0, 0.5, -3.0], [0.25, 0.0, 0.0]));
+        assert_eq!((seen.e_along, seen.e_cross, seen.e_norm), (-3.0, 0.5, 3f64.hypot(0.5)));
+        // The flow comes from where it goes.
+        assert!((seen.speed - 0.5).abs() < 1e-15 && (seen.psi_e - 0.25 - 0.4f64.atan2(0.3)).abs() < 1e-15, "{seen:?}");
+    }
+
+    #[test]
     fn own_rate_of_r_is_that_of_the_target() {
         let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
         let mut craft = craft(path, WEAVING, State { x: 0.3, y: 0.1, heading: 0.5, surge: 0.4, ..State::default() });

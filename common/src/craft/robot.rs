@@ -762,6 +762,15 @@ mod tests {
     }
 
     #[test]
+    fn what_is_seen_of_it_is_where_it_is() {
+        let mut craft = robot(Line::new(Vector3::new(0.0, 0.0, -3.0), 0.0, 2.0).unwrap(), 1.0, 0.5, 0.25);
+        craft.place_target(2.0);
+        let seen = craft.observe();
+        assert_eq!((seen.position, seen.attitude, seen.psi_e), ([1.0, 0.5, -3.0], [0.25, 0.0, 0.0], 0.25));
+        assert_eq!((seen.e_along, seen.e_cross, seen.e_norm), (-3.0, 0.5, 3f64.hypot(0.5)));
+    }
+
+    #[test]
     fn the_target_can_be_placed() {
         let mut craft = robot(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap(), 1.0, 0.5, 0.0);
         craft.place_target(3.0);

@@ -274,6 +274,15 @@ mod tests {
         assert!(new(0.5, 1.0, 0.0).is_err() && new(0.5, -1.0, 1.0).is_err() && new(f64::NAN, 1.0, 1.0).is_err());
         let apart = Signals::new(3, &STAR[..2], allowance(0.5, 1.0, 1.0), Time::from_secs(10.0));
         assert!(apart.unwrap_err().contains("never connect"));
+        let two_sources = Signals::new(3, &[(1, 0), (1, 2)], allowance(0.5, 1.0, 1.0), Time::from_secs(10.0));
+        assert!(two_sources.unwrap_err().contains("never connect"), "joined is not enough");
+        // A mission has at least one dwell time, and the last one may be cut.
+        let slots = |end: f64| {
+            Signals::new(3, &STAR, allowance(0.5, 1.0, 1.0), Time::from_secs(end))
+                .map(|found| found.starts()[0].0.len())
+        };
+        assert!(slots(0.0).is_err() && slots(1_000_001.0).is_err());
+        assert_eq!((slots(0.5), slots(1.0), slots(1.5)), (Ok(1), Ok(1), Ok(2)));
     }
 
     proptest! {

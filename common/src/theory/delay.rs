@@ -147,6 +147,8 @@ mod tests {
         assert!(!holds(DelayGains::Averaged(f64::INFINITY), 5.0, true));
         let words = |tau| verdict(DelayGains::Fixed(&[0.1; 3], &graphs), s(tau), 0.5, true).value;
         assert!(words(5.0).contains("errors remain") && words(0.0).contains("no delay"));
+        let connected = |connected| verdict(DelayGains::Averaged(0.2), s(5.0), 0.5, connected).value;
+        assert!(connected(false).starts_with("not connected in mean") && connected(true).starts_with("v_L*"));
         assert!(verdict(DelayGains::Averaged(0.2), s(5.0), 0.5, true).value.contains("v_L* = 0.2500"));
     }
 

@@ -213,6 +213,17 @@ mod tests {
     }
 
     #[test]
+    fn who_is_stuck_is_no_follower_more() {
+        // (2.35) has q for all followers but one, (2.42) for all but two.
+        for (n, nominal, failed) in [(2, 1, 1), (3, 2, 1), (4, 2, 2)] {
+            let fleet = Gateway { n, ..section_2_5_3(false) };
+            assert_eq!((fleet.factors(false).len(), fleet.factors(true).len()), (nominal, failed), "{n}");
+        }
+        let [alive, stuck] = [false, true].map(|failed| section_2_5_3(false).verdict(failed).name);
+        assert!(stuck.contains("failed") && !alive.contains("failed"));
+    }
+
+    #[test]
     fn section_2_5_3_leaves_0_083_rad() {
         let error = section_2_5_3(false).steady_error(0.25, 3.0, 0.2, 2.0);
         assert!((error + 0.083_333).abs() < 1e-6, "{error}");

@@ -200,6 +200,20 @@ pub(crate) mod tests {
         assert!((prompt - 0.5).abs() < 1e-12 && (pair_of_modes[0].re + 0.5 * 0.992 / 0.99).abs() < 1e-9);
     }
 
+    #[test]
+    fn late_news_go_the_way_of_the_link() {
+        // 1 hears 0, who hears nobody, R = 1 and (3.72): 0 comes to v_L by itself, (1 − aτ_o)s + a, and 1 to 0,
+        // (1 − aτ_o)s² + (a − bτ_o)s + b, however late what 0 says is.
+        let (a, b, graph) = (1.0, 0.5, Graph::from_arcs(2, &[(1, 0)]));
+        for neighbours in [0.02, 0.3] {
+            let late = Late { own: 0.02, neighbours };
+            let found = Law::Directed { a, b }.late_eigenvalues(&graph, &graph.laplacian(), &[1.0; 2], late);
+            let (lead, damping) = (1.0 - a * late.own, a - b * late.own);
+            let product = |s: &Complex<f64>| ((s * lead + a) * (s * s * lead + s * damping + b)).norm();
+            assert!(found.expect("it can agree").iter().all(|s| product(s) < 1e-9), "{neighbours}");
+        }
+    }
+
     proptest! {
         #[test]
         fn proposition_3_4_solutions_agree_on_every_connected_graph(

@@ -278,7 +278,13 @@ mod tests {
         assert!((of(0.6, 7.5) - 0.18).abs() < 1e-12);
         assert!((of(0.6, 0.3) - 0.15).abs() < 1e-12);
         assert!((of(0.6, 0.4) - 0.18).abs() < 1e-12);
-        assert!(Underactuated { gains: [0.5, 1.3, f64::INFINITY, 1.1], ..VEHICLE }.type_1().is_none());
+        for wrong in [
+            Underactuated { gains: [0.5, 1.3, f64::INFINITY, 1.1], ..VEHICLE },
+            Underactuated { mass: (0.0, 7.6), ..VEHICLE },
+            Underactuated { inertia: (-1.0, 7.7), ..VEHICLE },
+        ] {
+            assert_eq!(wrong.type_1(), None, "{wrong:?}");
+        }
     }
 
     #[test]

@@ -690,6 +690,9 @@ mod tests {
         for drift in [0.5, -0.5] {
             assert!((of(&triangle, seen, drift).added - 0.1 * 3f64.sqrt() * 2.0 / 3.0).abs() < 1e-12);
         }
+        // Of several connected ones the least counts: a row has λ_2 = 1.
+        let mixed = [Graph::complete(3), Graph::from_edges(3, &[(0, 1), (1, 2)])];
+        assert!((of(&mixed, seen, 0.5).added - 0.1 * 3f64.sqrt() * 2.0).abs() < 1e-12);
         // Never connected at once: that of the union, a row, with one neighbour at a time; and of what never connects nothing.
         let by_turns = [Graph::from_edges(3, &[(0, 1)]), Graph::from_edges(3, &[(1, 2)])];
         assert!((of(&by_turns, seen, 0.5).added - 0.1 * 3f64.sqrt()).abs() < 1e-12);

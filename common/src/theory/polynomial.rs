@@ -143,6 +143,8 @@ mod tests {
         assert!(close(slowest(&[1.0, 3.0, 2.0]), 1.0, 1));
         assert!(close(slowest(&[1.0, 1.0, 1.0]), 0.5, 1), "a pair of complex roots is two different ones");
         assert_eq!(slowest(&[0.0, 1.0]), None);
+        // (λ² + 0.2λ + 1)(λ + 3): a pair that turns is slower than a root that does not.
+        assert!(close(slowest(&multiply(&[1.0, 0.2, 1.0], &[1.0, 3.0])), 0.1, 1));
         // Four digits of each, however slow: 0.001 and 0.00105 are two.
         assert!(close(slowest(&[1.0, 2.05e-3, 1.05e-6]), 1e-3, 1));
     }

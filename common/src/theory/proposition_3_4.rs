@@ -115,6 +115,9 @@ mod tests {
         // c = 1, a = 1, λ = 2: [2 −√2; −√2 2], least eigenvalue 2 − √2: the exact rate is the same here.
         let rate = rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &Graph::complete(2), 1.0).expect("connected");
         assert!((rate - (2.0 - 2f64.sqrt())).abs() < 1e-12, "{rate}");
+        // Three, all two-way, λ = 3: [3 −√3; −√3 2].
+        let rate = rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &Graph::complete(3), 1.0).expect("connected");
+        assert!((rate - (5.0 - 13f64.sqrt()) / 2.0).abs() < 1e-12, "{rate}");
         let one_way = Graph::from_arcs(2, &[(0, 1)]);
         assert_eq!(rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &one_way, 1.0), None);
         assert_eq!(rate_for_varying_paths(Law::SolutionTwo { a: 1.0, b: 1.0 }, &Graph::complete(2), 1.0), None);

@@ -302,6 +302,11 @@ mod tests {
         // λ² + aμλ + bμ at μ = 8: 4 ∓ √8, slower than nothing else, for the leader's loop has no mean of η that decays at a.
         let rate = DirectedLaw::Leader.rate(1.0, 1.0, &[Complex::from(8.0)]);
         assert!((rate - (4.0 - 8f64.sqrt())).abs() < 1e-12, "{rate}");
+        // Who is alone has a mean of η only: it decays at a, unless the vehicle leads.
+        assert_eq!(
+            (DirectedLaw::OverC.rate(2.0, 1.0, &[]), DirectedLaw::Leader.rate(2.0, 1.0, &[])),
+            (2.0, f64::INFINITY)
+        );
         // Roots far apart: the small one, b/a, to all its digits.
         for a in [1e6, -1e6] {
             let [large, small] = DirectedLaw::OverC.roots(a, 1.0, Complex::from(1.0));

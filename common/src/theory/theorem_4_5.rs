@@ -182,7 +182,7 @@ mod tests {
         assert!(good.holds && good.norm_rate.is_some_and(|rate| rate > 0.0));
         let one_way = verdict(fleet, Some(s(10.0)), s(10.0), false, type_ii);
         assert_eq!((one_way.holds, one_way.norm_rate), (false, None));
-        assert!(one_way.value.ends_with("one-way links"));
+        assert!(one_way.value.ends_with("one-way links") && !good.value.contains("one-way"));
         let never = verdict(fleet, None, s(10.0), true, type_ii);
         assert_eq!((never.holds, never.norm_rate), (false, None));
         let slow_following = verdict(fleet, Some(s(10.0)), s(10.0), true, TypeII { lambda_1: 1e-4 });

@@ -330,7 +330,7 @@ mod tests {
         let (auv, none, up) = (sirene(), Vector3::zeros(), Vector3::z());
         let drag = auv.torque(&none, &Vector3::new(0.0, -0.5, 0.0), &none);
         assert!((drag - Vector3::new(0.0, 0.8 * 0.5 + 7.2 * 0.25, 0.0)).norm() < 1e-12, "{drag}");
-        let arm = AuvParameters { centre_of_buoyancy: Vector3::new(0.1, 0.2, -0.3), ..*auv.parameters() };
+        let arm = AuvParameters { centre_of_buoyancy: Vector3::new(0.1, 0.2, -0.3), weight: 41.0, ..*auv.parameters() };
         let righting = Auv::new(arm).expect("valid").torque(&none, &none, &up);
         assert!((righting - Vector3::new(-0.2 * 39.24, 0.1 * 39.24, 0.0)).norm() < 1e-12, "{righting}");
         let munk = auv.torque(&Vector3::new(0.5, 0.2, 0.0), &none, &none);

@@ -72,5 +72,6 @@ mod tests {
         let model = |_: f64, x: &Vector1<f64>, _: &(), _: &()| -x;
         let x = Vector1::new(1.0);
         assert_eq!(advance(model, &x, &(), &(), 0.1, 0), advance(model, &x, &(), &(), 0.1, 1));
+        assert_eq!(advance(model, &x, &(), &(), 0.1, 1), rk4_step(model, 0.0, &x, &(), &(), 0.1));
     }
 }
