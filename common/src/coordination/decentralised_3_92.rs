@@ -268,10 +268,16 @@ mod tests {
         let law = Decentralised::new(0, 1.0, 1.0, Weighing::Normalised).unwrap();
         let own = Own { xi: 3.0, v: 1.0, r: 2.0, ..Own::default() };
         let strange = [Neighbour { xi: f64::NAN, ..Neighbour::default() }];
-        for heard in [&[][..], &strange] {
+        let mute = [Neighbour { xi: 1.0, scalar: f64::NAN, ..Neighbour::default() }];
+        for heard in [&[][..], &strange, &mute] {
             assert_eq!(demand_of(law.vehicle(1).as_mut(), SpeedReference::default(), &own, heard), 0.0);
         }
+        // Where R grows the speed must grow with it: Ṙ v/R.
+        let wider = Own { v: 3.0, r_dot: 0.5, ..own };
+        assert_eq!(demand_of(law.vehicle(1).as_mut(), SpeedReference::default(), &wider, &[]), 0.75);
         assert!(FleetLaw::says(&law, 0).is_some() && law.vehicle(1).says(&own) == Some(0.5));
+        let reference = SpeedReference { v_l: 9.0, v_l_dot: 0.0 };
+        assert_eq!(law.vehicle(1).neighbour_rate(reference, 0.25), 0.25, "a neighbour goes on as it says");
         assert!(Decentralised::new(0, 0.0, 1.0, Weighing::Plain).is_err());
     }
 }

@@ -190,4 +190,17 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_estimate_is_a_slow_average_of_what_is_asked_for_in_company() {
+        let mut one = law().vehicle(0);
+        assert_eq!(ask(one.as_mut(), 3.0, &[]), 0.5, "who never heard anyone goes at v_L");
+        // In company it is asked for v_L − 0.1·2 = 0.6 v_L, for half of T: f = 0.6 + 0.4e^(−½).
+        assert!((ask(one.as_mut(), 3.0, &[1.0]) - 0.3).abs() < 1e-15);
+        one.advance(5.0);
+        assert!((ask(one.as_mut(), 3.0, &[]) - 0.5 * (0.6 + 0.4 * (-0.5f64).exp())).abs() < 1e-12);
+        // Alone it keeps it.
+        one.advance(50.0);
+        assert!((ask(one.as_mut(), 3.0, &[]) - 0.5 * (0.6 + 0.4 * (-0.5f64).exp())).abs() < 1e-12);
+    }
 }

@@ -91,6 +91,15 @@ mod tests {
         let (one, two) = (SolutionOne::new(1.0).unwrap(), SolutionTwo::new(1.0, 1.0).unwrap());
         assert!(Diagonal::new(vec![Arc::new(one), Arc::new(two)]).is_err(), "one of them sends more");
         assert!(Diagonal::new(vec![Arc::new(one), Arc::new(Switching::new(1.0).unwrap())]).is_err());
+        assert!(
+            Diagonal::new(vec![Arc::new(two), Arc::new(Switching::new(1.0).unwrap())]).is_err(),
+            "an acceleration, a rate"
+        );
+        // Whoever comes after the last has the last row, and says what that says.
+        let law = of(&[[1.0, 0.0], [2.0, 0.0]], |[a, _]| SolutionOne::new(a));
+        assert!(
+            law.says(0).is_some() && law.says(5) == law.says(1) && law.vehicle(5).says(&Default::default()).is_some()
+        );
     }
 
     proptest! {

@@ -198,10 +198,48 @@ mod tests {
         assert!((next - first + 0.1 * (5.0 * 0.3 + 2.0 * 4.0 * 0.75 + 2.0 * 0.2)).abs() < 1e-12);
         let mut spoke = law.vehicle(2);
         spoke.demand(reference, &own, &[Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }]);
+        // ζ moves by R(cS + dE), E with it: S = −½ held for two periods, E in the middle of them −0.025 and −0.075.
+        let mut moved = law.vehicle(2);
+        let asked = [(); 3].map(|()| {
+            let ahead = [Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }];
+            let Demand::Forward(asked) = moved.demand(reference, &own, &ahead) else { panic!() };
+            moved.advance(0.1);
+            asked
+        });
+        assert!((asked[1] - asked[0] - 0.1 * 2.0 * (4.0 * 0.5 + 0.025)).abs() < 1e-12, "{asked:?}");
+        assert!((asked[2] - asked[1] - 0.1 * 2.0 * (4.0 * 0.5 + 0.075)).abs() < 1e-12, "{asked:?}");
+        // Not being told v_L, they take others to move as they do themselves.
+        assert_eq!([hub.neighbour_rate(reference, 9.0), spoke.neighbour_rate(reference, 9.0)], [0.25; 2]);
         spoke.advance(0.1);
         assert!((spoke.says(&own).unwrap() - 0.05).abs() < 1e-15, "δe grows while the gateway is ahead");
         assert_eq!((hub.says(&own), law.says(0).is_some(), law.says(2).is_some()), (None, false, true));
-        assert!(Gateway::new(0, 5.0, GAINS).unwrap().vehicle(1).says(&own).is_none());
+        let plain = Gateway::new(0, 5.0, GAINS).unwrap();
+        assert!(plain.says(1).is_none() && plain.vehicle(1).says(&own).is_none());
+        // Without the extra integrator what a distance that stays adds is the same in every period.
+        let mut spoke = plain.vehicle(1);
+        let ahead = [Neighbour { vehicle: 0, xi: 1.5, ..Neighbour::default() }];
+        let asked = [(); 3].map(|()| {
+            let Demand::Forward(asked) = spoke.demand(reference, &own, &ahead) else { panic!() };
+            spoke.advance(0.1);
+            asked
+        });
+        assert!((asked[2] - 2.0 * asked[1] + asked[0]).abs() < 1e-12 && asked[1] > asked[0], "{asked:?}");
+        // What is no number is not heard, of either kind.
+        let strange = [
+            Neighbour { vehicle: 1, xi: f64::NAN, ..Neighbour::default() },
+            Neighbour { vehicle: 2, xi: 0.5, scalar: f64::NAN, ..Neighbour::default() },
+        ];
+        let [strange, nobody] = [&[Neighbour { scalar: 5.0, ..strange[0] }, strange[1]][..], &[]].map(|heard| {
+            let mut hub = law.vehicle(0);
+            [(); 3].map(|()| {
+                // The second one's ξ is a number, and counts in that.
+                let own = Own { xi: 0.5, ..own };
+                let demand = hub.demand(reference, &own, heard);
+                hub.advance(0.1);
+                demand
+            })
+        });
+        assert_eq!(strange, nobody);
     }
 
     #[test]

@@ -98,7 +98,7 @@ impl Past {
 
 #[cfg(test)]
 mod tests {
-    use super::{KnownDelay, Past};
+    use super::{KnownDelay, MOST_REMEMBERED, Past};
     use crate::coordination::delayed_4_34::Delayed;
     use crate::coordination::{Demand, FleetLaw, Neighbour, Own, SpeedReference};
     use std::f64::consts::FRAC_PI_2;
@@ -194,5 +194,35 @@ mod tests {
         assert!((past.ago(10.0).expect("remembered") - 2.0 * (past.now - 10.0)).abs() < 1e-9);
         assert_eq!(past.ago(10.3), None);
         assert_eq!(past.ago(-1.0), Some(2.0 * past.now));
+    }
+
+    #[test]
+    fn what_is_remembered_has_an_end_however_long_the_memory() {
+        let mut past = Past::default();
+        for period in 0..MOST_REMEMBERED + 10 {
+            past.now = period as f64;
+            past.keep(0.5 * period as f64, f64::INFINITY);
+            assert!(past.places.len() <= MOST_REMEMBERED);
+        }
+        assert_eq!(
+            (past.ago(0.5), past.ago(MOST_REMEMBERED as f64)),
+            (Some(0.5 * (MOST_REMEMBERED as f64 + 8.5)), None)
+        );
+    }
+
+    #[test]
+    fn every_neighbour_is_compared_with_its_own_instant() {
+        // Where it was 0.5 s and 1 s ago, at 0.5 per second: v_r = v_L − 0.2((0.75 − 0.7) + (0.5 − 0.2)).
+        let mut one = KnownDelay::new(0.2, 10.0).unwrap().vehicle(0);
+        let reference = SpeedReference { v_l: V_L, v_l_dot: 0.0 };
+        let at = |xi: f64| Own { xi, ..Own::default() };
+        for step in 0..20 {
+            one.demand(reference, &at(0.05 * f64::from(step)), &[]);
+            one.advance(0.1);
+        }
+        let heard =
+            [(0.7, 0.5), (0.2, 1.0)].map(|(said, age)| Neighbour { said, age, xi: 99.0, ..Neighbour::default() });
+        let Demand::Rate(asked) = one.demand(reference, &at(1.0), &heard) else { panic!() };
+        assert!((asked - (V_L - 0.2 * 0.35)).abs() < 1e-12, "{asked}");
     }
 }

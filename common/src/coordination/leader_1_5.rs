@@ -86,7 +86,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::LeaderIntegral;
-    use crate::coordination::sampled_fleet::SampledFleet;
+    use crate::coordination::sampled_fleet::{SampledFleet, demand_of};
     use crate::coordination::{FleetLaw, Neighbour, Own, SpeedReference};
     use crate::graph::Graph;
 
@@ -160,6 +160,14 @@ mod tests {
     fn only_the_position_is_on_the_air() {
         let law = LeaderIntegral::new(0, 0.2, 0.04).unwrap();
         assert!(law.says(0).is_none() && law.vehicle(1).says(&Own::default()).is_none());
+        // Two ahead for a quarter of a second: b₂e_I is what it goes at when it hears nobody, and what it takes a neighbour to go at.
+        let mut learner = LeaderIntegral::new(0, 0.7, 0.3).unwrap().vehicle(1);
+        let (heard, reference) =
+            ([Neighbour { xi: 2.0, ..Neighbour::default() }], SpeedReference { v_l: 9.0, v_l_dot: 0.0 });
+        learner.demand(reference, &Own::default(), &heard);
+        learner.advance(0.25);
+        assert_eq!(demand_of(learner.as_mut(), reference, &Own::default(), &[]), 0.15);
+        assert_eq!(learner.neighbour_rate(reference, 0.0), 0.15);
         assert!(LeaderIntegral::new(0, 0.2, 0.0).is_err() && LeaderIntegral::new(0, -0.2, 0.1).is_err());
     }
 }

@@ -200,3 +200,15 @@ impl<L: CoordinationLaw> VehicleLaw for Stateless<L> {
 mod ideal_fleet;
 #[cfg(test)]
 mod sampled_fleet;
+
+#[cfg(test)]
+mod tests {
+    use super::introduction_1_5::Introduction;
+    use super::{FleetLaw, SpeedReference};
+
+    #[test]
+    fn a_neighbour_is_taken_to_go_on_at_the_formation_speed() {
+        let law = FleetLaw::vehicle(&Introduction::new(0.5).unwrap(), 0);
+        assert_eq!(law.neighbour_rate(SpeedReference { v_l: 0.3, v_l_dot: 0.0 }, 7.0), 0.3);
+    }
+}

@@ -90,6 +90,14 @@ mod tests {
     }
 
     #[test]
+    fn others_are_taken_to_move_as_one_does_oneself() {
+        let mut one = Neighbours::new(0, 5.0, GAINS).unwrap().vehicle(1);
+        let reference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
+        one.demand(reference, &Own { v: 0.5, r: 2.0, ..Own::default() }, &[]);
+        assert_eq!(one.neighbour_rate(reference, 9.0), 0.25);
+    }
+
+    #[test]
     fn whoever_is_told_the_row_agrees_though_all_hear_all() {
         for told in [0, 2] {
             let law = Neighbours::new(told, 5.0, GAINS).unwrap();

@@ -89,16 +89,19 @@ mod tests {
 
     #[test]
     fn the_wave_is_even_over_thousands_of_periods() {
-        let mut law = SquareWave::new(0.05, 4.0).unwrap().vehicle(0);
-        let mut forward = 0;
-        for step in 0..200_000 {
-            let demand = law.demand(SpeedReference::default(), &Own::default(), &[]);
-            let expected = if step % 200 < 100 { 0.05 } else { -0.05 };
-            assert_eq!(demand, Demand::Forward(expected), "{step}");
-            forward += i32::from(expected > 0.0);
-            law.advance(0.02);
+        // Control periods of 0.02 and 0.1 s, of which the latter add up to less than half a wave or a whole one.
+        for (period, dt, steps) in [(4.0, 0.02, 200), (1.6, 0.1, 16), (1.0, 0.1, 10)] {
+            let mut law = SquareWave::new(0.05, period).unwrap().vehicle(0);
+            let mut forward = 0;
+            for step in 0..200_000 {
+                let demand = law.demand(SpeedReference::default(), &Own::default(), &[]);
+                let expected = if step % steps < steps / 2 { 0.05 } else { -0.05 };
+                assert_eq!(demand, Demand::Forward(expected), "{period} {step}");
+                forward += i32::from(expected > 0.0);
+                law.advance(dt);
+            }
+            assert_eq!(forward, 100_000);
         }
-        assert_eq!(forward, 100_000);
         assert!(SquareWave::new(0.0, 1.0).is_err() && SquareWave::new(1.0, f64::NAN).is_err());
     }
 

@@ -157,6 +157,13 @@ mod tests {
         for wrong in [(0, 0, 1.0), (0, 2, 1.0), (0, 1, 0.0), (0, 1, f64::NAN)] {
             assert!(Weighted::new(1.0, 1.0, 2, &[wrong]).is_err(), "{wrong:?}");
         }
+        assert!(Weighted::new(1.0, 1.0, 2, &[(2, 0, 1.0)]).is_err());
+        let strange = [
+            Neighbour { vehicle: 1, xi: f64::NAN, ..Neighbour::default() },
+            Neighbour { vehicle: 7, xi: 9.0, ..Neighbour::default() },
+        ];
+        let own = Own { xi: 1.0, eta: 0.5, r: 2.0, ..Own::default() };
+        assert_eq!(demand_of(law.vehicle(0).as_mut(), SpeedReference::default(), &own, &strange), -0.5);
         assert!(Weighted::new(0.0, 1.0, 2, &[]).is_err() && Weighted::new(1.0, 0.0, 2, &[]).is_err());
     }
 }

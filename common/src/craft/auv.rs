@@ -327,7 +327,9 @@ mod tests {
         let refused = craft.refused();
         fly(&mut craft, 0.5, f64::NAN, 1.0);
         craft.command(SpeedReference::default(), Demand::Acceleration(1.0));
-        assert_eq!(craft.refused(), refused + 21);
+        assert_eq!((craft.refused(), Craft::refused(&craft)), (refused + 21, refused + 21));
+        let counts: Vec<u64> = craft.warnings().iter().map(|warning| warning.count).collect();
+        assert_eq!(counts, [craft.limited(), craft.saturated(), craft.refused()]);
         assert!(craft.is_sound());
     }
 
@@ -351,11 +353,18 @@ mod tests {
     #[test]
     fn a_stuck_speed_holds_and_errors_do_not_reach_the_record() {
         let mut craft = craft(0, TargetMotion::TypeII, 1.0);
-        let errors = InstrumentErrors { heading: 0.5, position: Vector3::x(), ..InstrumentErrors::default() };
+        let (velocity, spin) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(0.4, 0.5, 0.6));
+        let errors = InstrumentErrors { heading: 0.5, position: Vector3::x(), velocity, spin };
         craft.expose(&Conditions { errors: Some(errors), stuck_speed: Some(0.4), ..Conditions::default() });
         let (seen, measured) = (craft.observe(), craft.measured());
         assert_eq!((seen.position[0], seen.attitude[0]), (5.0, 0.0));
         assert!((yaw_pitch_roll(&measured.attitude)[0] - 0.5).abs() < 1e-15 && measured.position.x == 6.0);
+        assert_eq!((measured.velocity, measured.spin), (Vector3::new(0.5, 0.2, 0.3), spin));
+        // A heading errs about the vertical, whatever the attitude: pitch and roll are as they were.
+        craft.state.attitude = from_yaw_pitch_roll(0.25, 0.3, -0.2);
+        let [yaw, pitch, roll] = yaw_pitch_roll(&craft.measured().attitude);
+        assert!((yaw - 0.75).abs() < 1e-12 && (pitch - 0.3).abs() < 1e-12 && (roll + 0.2).abs() < 1e-12);
+        craft.state.attitude = UnitQuaternion::identity();
         fly(&mut craft, 0.5, 0.5, 5.0);
         assert_eq!(craft.state.velocity.x, 0.4);
         assert!(craft.warnings().iter().all(|warning| warning.count == 0), "{:?}", craft.warnings());
@@ -383,6 +392,14 @@ mod tests {
         craft.command(SpeedReference { v_l: 0.5, v_l_dot: 0.0 }, Demand::Rate(0.4));
         craft.advance(0.5, 4);
         assert!((craft.observe().xi - (70.483 + 0.2)).abs() < 1e-12);
+        // The same in one step but for rounding and the method; none counts as one.
+        let [none, one, four] = [0, 1, 4].map(|substeps| {
+            let mut other = self::craft(1, TargetMotion::TypeI, 1.0);
+            other.command(SpeedReference { v_l: 0.5, v_l_dot: 0.0 }, Demand::Rate(0.4));
+            other.advance(0.1, substeps);
+            other.state.position
+        });
+        assert!(none == one && one != four && (one - four).norm() < 1e-3, "{one} {four}");
         assert!(craft.eta != 0.0);
         craft.place_target(12.0);
         assert_eq!((craft.observe().xi, craft.eta), (12.0, 0.0));
@@ -398,5 +415,41 @@ mod tests {
         }
         assert!((eta_after(0.2, 0.7, 1.3, 2.0) - eta).abs() < 1e-5);
         assert!((eta_after(0.2, 0.7, 1.3, 100.0) + 0.7 / 1.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn coordination_is_told_the_alpha_2_of_the_nominal_rate() {
+        // v_n is the nominal factor times v_L, for the law as for what is fed back to coordination; and its slope v̇_n likewise.
+        let mut craft = craft(0, TargetMotion::TypeII, 2.0 / 3.0);
+        fly(&mut craft, 0.6, 0.4, 20.0);
+        let expected = craft.law.alpha_2(&craft.state, &craft.target, 0.4);
+        let own = craft.own(SpeedReference { v_l: 0.6, v_l_dot: 0.0 });
+        assert!((own.alpha_2 - expected).abs() < 1e-12 && (own.eta, own.xi) == (0.0, craft.gamma));
+        assert!(
+            (craft.law.alpha_2(&craft.state, &craft.target, 0.6) - expected).abs() > 1e-6,
+            "else nothing is tested"
+        );
+        craft.command(SpeedReference { v_l: 0.6, v_l_dot: 0.03 }, Demand::Rate(0.4));
+        let rate = TargetRate { nominal: 0.4, nominal_dot: 0.02, actual: 0.4 };
+        let wanted = craft.law.evaluate(&craft.state, &craft.target, rate).input;
+        let found = craft.held.input;
+        let difference = [
+            found.thrust - wanted.thrust,
+            found.pitch_torque - wanted.pitch_torque,
+            found.yaw_torque - wanted.yaw_torque,
+        ];
+        assert!(difference.iter().all(|x| x.abs() < 1e-9), "{difference:?}");
+    }
+
+    #[test]
+    fn a_state_that_is_no_number_is_told_of() {
+        let sound = || craft(0, TargetMotion::TypeI, 1.0);
+        let mut nowhere = sound();
+        nowhere.place_target(f64::NAN);
+        let mut stuck = sound();
+        stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+        let mut late = sound();
+        late.eta = f64::INFINITY;
+        assert!(sound().is_sound() && !nowhere.is_sound() && !stuck.is_sound() && !late.is_sound());
     }
 }

@@ -208,6 +208,7 @@ mod tests {
     use crate::following::line_of_sight::LineOfSight;
     use crate::path::circle::{Circle, Turn};
     use crate::path::line::Line;
+    use crate::path::spline::Spline;
     use crate::vehicle::environment::{Conditions, InstrumentErrors};
 
     const REFERENCE: SpeedReference = SpeedReference { v_l: 0.5, v_l_dot: 0.0 };
@@ -274,6 +275,84 @@ mod tests {
         }
         let seen = craft.observe();
         assert!(seen.e_cross.abs() < 1e-3 && seen.xi < -10.0, "{seen:?}");
+    }
+
+    #[test]
+    fn limits_are_of_the_rates_at_which_speed_and_heading_change() {
+        // From rest along a line at 0.3 rad, wanting 1 m/s and a quarter turn at most: 0.5 m/s² and 0.2 rad/s, either way.
+        let of = |limits, y: f64| {
+            let line = Line::new(Vector3::zeros(), 0.3, 2.0).unwrap();
+            let (sin, cos) = 0.3f64.sin_cos();
+            let mut craft = craft(line, -y * sin, y * cos).limited(limits, 0.0, 0.3);
+            craft.command(REFERENCE, Demand::Rate(0.5));
+            let before = craft.observe();
+            craft.advance(0.4, 4);
+            let after = craft.observe();
+            (after.speed - before.speed, after.attitude[0] - before.attitude[0], craft.warnings()[0].count)
+        };
+        let none = Limits::NONE;
+        for side in [3.0, -3.0] {
+            let (faster, turned, late) = of(Limits { acceleration: 0.5, turn_rate: 0.2, ..none }, side);
+            assert!((faster - 0.2).abs() < 1e-12 && (turned + 0.08 * side.signum()).abs() < 1e-12 && late == 1);
+        }
+        // One limit is enough to be limited, and it does not bind the other.
+        let (faster, turned, late) = of(Limits { turn_rate: 0.2, ..none }, 3.0);
+        assert!((faster - 1.0).abs() < 1e-12 && (turned + 0.08).abs() < 1e-12 && late == 1, "{faster} {turned}");
+        let (faster, turned, late) = of(Limits { acceleration: 0.5, ..none }, 3.0);
+        assert!((faster - 0.2).abs() < 1e-12 && turned < -0.5 && late == 1, "{faster} {turned}");
+        assert_eq!(of(Limits { acceleration: 99.0, turn_rate: 99.0, ..none }, 3.0).2, 0, "what is reached is not late");
+    }
+
+    #[test]
+    fn braking_is_limited_as_well_and_the_way_is_that_of_the_substeps() {
+        // From 1 m/s along the line at rest: 0.9 m/s after 0.2 s, by steps of 0.05 s at 0.975, 0.95, 0.925 and 0.9 m/s.
+        let line = Line::new(Vector3::zeros(), 0.3, 2.0).unwrap();
+        let mut craft = craft(line, 0.0, 0.0).limited(Limits { acceleration: 0.5, ..Limits::NONE }, 1.0, 0.3);
+        craft.command(REFERENCE, Demand::Rate(0.0));
+        craft.advance(0.2, 4);
+        let seen = craft.observe();
+        assert!((seen.speed - 0.9).abs() < 1e-12 && (seen.xi - 0.05 * 3.75 / 2.0).abs() < 1e-12, "{seen:?}");
+        assert!((seen.xi_rate - 0.45).abs() < 1e-12 && seen.attitude == [0.3, 0.0, 0.0], "{seen:?}");
+        // No substeps count as one, in which it brakes before it moves.
+        craft.advance(0.2, 0);
+        assert!((craft.observe().xi - seen.xi - 0.2 * 0.8 / 2.0).abs() < 1e-12);
+        // Stuck, a speed that is not the wanted one is nobody's fault.
+        craft.expose(&Conditions { stuck_speed: Some(0.8), ..Conditions::default() });
+        craft.advance(0.2, 1);
+        assert_eq!(craft.warnings()[0].count, 2);
+    }
+
+    #[test]
+    fn errors_are_made_up_for_as_far_as_they_are_seen() {
+        // A speed that is told 0.1 too fast is driven 0.1 too slow; to the right of the line the distance is no less.
+        let mut craft = craft(Line::new(Vector3::zeros(), 0.3, 2.0).unwrap(), 0.3, -0.5);
+        let errors = InstrumentErrors { velocity: Vector3::new(0.1, 9.0, 9.0), ..InstrumentErrors::default() };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        craft.command(REFERENCE, Demand::Rate(0.5));
+        let seen = craft.observe();
+        assert!((seen.speed - 0.9).abs() < 1e-12 && seen.e_cross < 0.0 && seen.e_norm == -seen.e_cross, "{seen:?}");
+        assert!((seen.xi_rate - 0.45 * (seen.attitude[0] - 0.3).cos()).abs() < 1e-12 && seen.e_along == 0.0);
+    }
+
+    #[test]
+    fn what_is_seen_of_it_is_where_it_is() {
+        let line = Line::new(Vector3::new(0.0, 0.0, -3.0), 0.0, 2.0).unwrap();
+        assert_eq!(craft(line, 1.0, 0.5).observe().position, [1.0, 0.5, -3.0]);
+        let climbing = Spline::by_length(vec![Vector3::zeros(), Vector3::new(3.0, 0.0, 1.0)], 1.0).unwrap();
+        let refused = KinematicCraft::new(Arc::new(climbing), LineOfSight::new(1.0).unwrap(), 0.0, 0.0);
+        assert!(refused.unwrap_err().contains("horizontal"));
+    }
+
+    #[test]
+    fn a_state_that_is_no_number_is_told_of() {
+        let sound = || craft(Line::new(Vector3::zeros(), 0.0, 2.0).unwrap(), 0.0, 1.0);
+        let mut stuck = sound();
+        stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+        let mut lost = sound();
+        lost.position.y = f64::NAN;
+        let mut turned = sound();
+        turned.held.heading = f64::INFINITY;
+        assert!(sound().is_sound() && !stuck.is_sound() && !lost.is_sound() && !turned.is_sound());
     }
 
     fn exposed(craft: &mut KinematicCraft, conditions: Conditions, periods: usize) {

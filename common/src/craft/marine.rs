@@ -308,6 +308,7 @@ mod tests {
     use crate::path::circle::{Circle, Turn};
     use crate::path::helix::Helix;
     use crate::path::line::Line;
+    use crate::path::sinusoid::Sinusoid;
     use crate::vehicle::environment::InstrumentErrors;
 
     const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
@@ -391,10 +392,18 @@ mod tests {
             craft(line(), SideSlip::NONE, State::default()).limited(Limits { force: 1.0, torque: 1.0, ..Limits::NONE });
         fly(&mut weak, 0..50);
         assert!(weak.warnings()[0].count > 0 && weak.observe().speed < 0.01);
+        // One effort at its limit is enough to be counted, whichever.
+        for (force, torque) in [(f64::INFINITY, 1.0), (10.0, f64::INFINITY)] {
+            let start = State { x: 5.0, surge: 0.4, sway: 0.1, heading: FRAC_PI_2, ..State::default() };
+            let mut weak = craft(circle(Turn::Left), WEAVING, start).limited(Limits { force, torque, ..Limits::NONE });
+            // What is wanted is the speed it has, so that the surge force is small and the sway force is not.
+            weak.command(REFERENCE, Demand::Rate(start.surge.hypot(start.sway) / 5.0));
+            assert_eq!(weak.warnings()[0].count, 1, "{:?}", weak.held.input);
+        }
         let mut adrift = craft(line(), SideSlip::NONE, State::default());
         let errors = InstrumentErrors { position: Vector3::y(), ..InstrumentErrors::default() };
         adrift.conditions = Conditions {
-            current: Some(Vector3::y()),
+            current: Some(Vector3::new(-3.0, 1.0, 0.0)),
             errors: Some(errors),
             stuck_speed: Some(0.2),
             ..adrift.conditions
@@ -402,6 +411,8 @@ mod tests {
         fly(&mut adrift, 0..1);
         let seen = adrift.observe();
         assert!((seen.e_cross - 0.02).abs() < 1e-6 && adrift.state.surge == 0.2, "{seen:?}");
+        assert!((seen.position[0] - (0.2 - 3.0) * 0.02).abs() < 1e-6, "{seen:?}");
+        assert_eq!(seen.attitude, [adrift.state.heading, 0.0, 0.0]);
         assert!(adrift.held.input.torque < 0.0, "it thinks that it is to the left");
         let law = Proposition33::new(Gains::default(), 1.0).unwrap();
         let helix = Arc::new(Helix::new(5.0, 9.0, 0.0, 0.1, 0.0).unwrap());
@@ -483,6 +494,100 @@ mod tests {
     }
 
     #[test]
+    fn the_law_steers_with_what_limited_forces_make_of_v_t() {
+        // Neither, the surge force, or both cut; or the surge stuck and the sway force cut.
+        for (force, stuck_speed, cut) in [
+            (f64::INFINITY, None, [false, false]),
+            (30.0, None, [true, false]),
+            (10.0, None, [true, true]),
+            (10.0, Some(0.4), [true, true]),
+        ] {
+            let state = State { x: 5.2, y: 0.3, heading: 1.2, surge: 0.4, sway: 0.1, turn_rate: 0.1 };
+            let mut craft = craft(circle(Turn::Left), WEAVING, state).limited(Limits { force, ..Limits::NONE });
+            craft.expose(&Conditions { stuck_speed, ..Conditions::default() });
+            craft.command(REFERENCE, Demand::Rate(0.05));
+            let input = craft.held.input;
+            assert_eq!([input.surge.abs() == force, input.sway.abs() == force], cut, "{input:?}");
+            // v̇_t by the equations of motion.
+            let held = |t: f64, x: &SVector<f64, 6>, tau: &Input, p: &Parameters| {
+                let mut rate = model(t, x, tau, p);
+                rate[3] = if stuck_speed.is_some() { 0.0 } else { rate[3] };
+                rate
+            };
+            let v_t = |dt: f64| {
+                craft.flow(&State::from_vector(advance(held, &state.to_vector(), &input, &PARAMETERS, dt, 1))).v_t
+            };
+            let v_dot = (v_t(1e-5) - v_t(-1e-5)) / 2e-5;
+            let (flow, r) = (craft.flow(&state), state.turn_rate);
+            let slip = craft.law.slip(flow.beta, &craft.wanted());
+            let motion = Motion { v: flow.v_t, v_dot, r, slip };
+            let e = craft.errors(&state, &flow);
+            let steered = |motion: &Motion| {
+                let steering = craft.law.steer(&e, motion, &Bend::of(&craft.target), craft.sense);
+                PARAMETERS.m_r * (steering.r_dot - PARAMETERS.f_r(flow.v_t, flow.beta, r))
+            };
+            assert!(
+                (input.torque - steered(&motion)).abs() < 1e-5 * input.torque.abs(),
+                "{force} {input:?} {}",
+                steered(&motion)
+            );
+            let other = Motion { v_dot: v_dot + 0.01, ..motion };
+            assert!((input.torque - steered(&other)).abs() > 1e-3 * input.torque.abs(), "else nothing is tested");
+        }
+    }
+
+    #[test]
+    fn what_is_measured_is_the_state_with_every_error() {
+        let state = State { x: 1.0, y: 2.0, heading: 0.3, surge: 0.4, sway: 0.2, turn_rate: 0.5 };
+        let mut craft = craft(circle(Turn::Left), WEAVING, state);
+        let errors = InstrumentErrors {
+            position: Vector3::new(0.125, 0.25, 9.0),
+            heading: 0.0625,
+            velocity: Vector3::new(0.5, 0.375, 9.0),
+            spin: Vector3::new(9.0, 9.0, 0.75),
+        };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        let wanted = State { x: 1.125, y: 2.25, heading: 0.3625, surge: 0.9, sway: 0.575, turn_rate: 1.25 };
+        assert!((craft.measured().to_vector() - wanted.to_vector()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn what_is_seen_of_it_is_where_it_is() {
+        let line = Line::new(Vector3::new(0.0, 0.0, -3.0), 0.0, 2.0).unwrap();
+        let state = State { x: 1.0, y: 0.5, heading: 0.25, surge: 0.3, sway: 0.4, turn_rate: 0.0 };
+        let mut craft = craft(line, WEAVING, state);
+        craft.place_target(2.0);
+        let seen = craft.observe();
+        assert_eq!((seen.position, seen.attitude), ([1.0, 0.5, -3.0], [0.25, 0.0, 0.0]));
+        assert_eq!((seen.e_along, seen.e_cross, seen.e_norm), (-3.0, 0.5, 3f64.hypot(0.5)));
+        // The flow comes from where it goes.
+        assert!((seen.speed - 0.5).abs() < 1e-15 && (seen.psi_e - 0.25 - 0.4f64.atan2(0.3)).abs() < 1e-15, "{seen:?}");
+    }
+
+    #[test]
+    fn own_rate_of_r_is_that_of_the_target() {
+        let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
+        let mut craft = craft(path, WEAVING, State { x: 0.3, y: 0.1, heading: 0.5, surge: 0.4, ..State::default() });
+        craft.place_target(0.3);
+        let own = craft.own(REFERENCE);
+        craft.command(REFERENCE, Demand::Rate(0.1));
+        craft.advance(1e-6, 1);
+        assert!(((craft.target.r() - own.r) / 1e-6 - own.r_dot).abs() < 1e-5 && own.r_dot.abs() > 0.05, "{own:?}");
+    }
+
+    #[test]
+    fn a_state_that_is_no_number_is_told_of() {
+        let sound = || craft(circle(Turn::Left), WEAVING, State { x: 5.0, ..State::default() });
+        let mut nowhere = sound();
+        nowhere.place_target(f64::NAN);
+        let mut stuck = sound();
+        stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+        let mut held = sound();
+        held.held.input.sway = f64::NAN;
+        assert!(sound().is_sound() && !nowhere.is_sound() && !stuck.is_sound() && !held.is_sound());
+    }
+
+    #[test]
     fn what_is_no_number_is_refused_and_counted() {
         let mut craft = craft(circle(Turn::Left), WEAVING, State { x: 5.0, surge: 0.4, ..State::default() });
         craft.command(REFERENCE, Demand::Rate(0.1));
@@ -496,6 +601,7 @@ mod tests {
         craft.command(REFERENCE, Demand::Rate(0.1));
         assert!(craft.held.input == held && craft.is_sound());
         assert_eq!(craft.warnings()[2], Warning { what: REFUSED, count: 4 });
+        assert_eq!(craft.refused(), 4);
     }
 
     proptest! {

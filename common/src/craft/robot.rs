@@ -334,13 +334,13 @@ mod tests {
     use crate::coordination::{CoordinationLaw, Demand, DemandKind, Neighbour, SpeedReference};
     use crate::craft::{Craft, Limits, REFUSED, Warning};
     use crate::following::proposition_3_1::{Approach, Bend, Gains, Motion, Proposition31};
-    use crate::path::Path;
     use crate::path::chain::{Chain, Segment};
     use crate::path::circle::{Circle, Turn};
     use crate::path::closest::closest_parameter;
     use crate::path::helix::Helix;
     use crate::path::line::Line;
     use crate::path::sinusoid::Sinusoid;
+    use crate::path::{Path, PathPoint};
     use crate::vehicle::dynamic_unicycle::{Parameters, State};
     use crate::vehicle::environment::{Conditions, InstrumentErrors};
 
@@ -559,6 +559,71 @@ mod tests {
     }
 
     #[test]
+    fn the_answers_of_the_speed_loop_by_hand() {
+        // R = 2 and R' = 0.6·0.8/2 = 0.24, at ξ̇ = 0.5: Ṙ = 0.12.
+        let target = PathPoint {
+            p: Vector3::zeros(),
+            d1: Vector3::new(1.6, 1.2, 0.0),
+            d2: Vector3::new(0.3, 0.0, 0.0),
+            d3: Vector3::zeros(),
+        };
+        assert!((target.r() - 2.0).abs() < 1e-15 && (target.dr_dxi() - 0.24).abs() < 1e-15);
+        let reference = SpeedReference { v_l: 0.1, v_l_dot: 0.05 };
+        let of = |speed_loop: SpeedLoop, demand| {
+            speed_loop
+                .answer(demand, reference, &target, 0.7, 0.5)
+                .map(|answer| [answer.v_dot, answer.wanted, answer.v_ref])
+        };
+        let close = |found: Option<[f64; 3]>, by_hand: [f64; 3]| {
+            found.is_some_and(|found| found.iter().zip(by_hand).all(|(a, b)| (a - b).abs() < 1e-15))
+        };
+        let acceleration = SpeedLoop::Acceleration;
+        assert!(close(of(acceleration, Demand::Acceleration(0.3)), [0.3 + 0.12 * 0.1 + 2.0 * 0.05, 0.2, 0.1]));
+        assert!(close(of(acceleration, Demand::Forward(0.3)), [0.3, 0.7, 0.1]));
+        let rate = SpeedLoop::Rate { k_0: 1.5 };
+        assert!(close(of(rate, Demand::Rate(0.3)), [0.12 * 0.3 - 1.5 * (0.7 - 0.6), 0.6, 0.3]));
+        assert!(of(acceleration, Demand::Rate(0.3)).is_none() && of(rate, Demand::Forward(0.3)).is_none());
+    }
+
+    #[test]
+    fn own_rate_of_r_is_that_of_the_target() {
+        let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
+        let mut craft = robot(path, 0.3, 0.1, 0.5);
+        craft.state.speed = 0.4;
+        let own = craft.own(REFERENCE);
+        craft.command(REFERENCE, Demand::Acceleration(0.0));
+        craft.advance(1e-6, 1);
+        assert!(((craft.target.r() - own.r) / 1e-6 - own.r_dot).abs() < 1e-5 && own.r_dot.abs() > 0.05, "{own:?}");
+    }
+
+    #[test]
+    fn what_is_measured_is_the_state_with_every_error() {
+        let mut craft = robot(Line::new(Vector3::zeros(), 0.0, 1.0).unwrap(), 1.0, 2.0, 0.3);
+        (craft.state.speed, craft.state.turn_rate) = (0.4, 0.5);
+        let errors = InstrumentErrors {
+            position: Vector3::new(0.125, 0.25, 9.0),
+            heading: 0.0625,
+            velocity: Vector3::new(0.5, 9.0, 9.0),
+            spin: Vector3::new(9.0, 9.0, 0.75),
+        };
+        craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+        let wanted = State { x: 1.125, y: 2.25, heading: 0.3625, speed: 0.9, turn_rate: 1.25 };
+        assert!((craft.measured().to_vector() - wanted.to_vector()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn a_state_that_is_no_number_is_told_of() {
+        let sound = || robot(Line::new(Vector3::zeros(), 0.0, 1.0).unwrap(), 0.0, 0.0, 0.0);
+        let mut nowhere = sound();
+        nowhere.place_target(f64::NAN);
+        let mut stuck = sound();
+        stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+        let mut held = sound();
+        held.held.xi_rate = f64::INFINITY;
+        assert!(sound().is_sound() && !nowhere.is_sound() && !stuck.is_sound() && !held.is_sound());
+    }
+
+    #[test]
     fn mass_and_inertia_scale_the_efforts_and_change_no_motion() {
         let circle = || Circle::new(Vector3::zeros(), 2.0, Turn::Left, 0.0, 1.0).unwrap();
         let mut heavy = robot(circle(), 2.3, 0.0, 1.0);
@@ -590,6 +655,16 @@ mod tests {
         craft.state.heading = 1.0;
         craft.command(REFERENCE, Demand::Forward(0.0));
         assert_eq!((craft.held.input.force, craft.held.input.torque), (0.0, -0.01));
+        assert_eq!((craft.warnings()[0].count, craft.refused()), (51, 0), "a torque counts as well");
+        // What the force makes of the speed is what the law reckons with: it steers as if no more had been asked for.
+        craft.limits.torque = f64::INFINITY;
+        craft.state.speed = 0.4;
+        craft.command(REFERENCE, Demand::Forward(-3.0));
+        let cut = craft.held.input.torque;
+        craft.command(REFERENCE, Demand::Forward(-0.1));
+        assert!((cut - craft.held.input.torque).abs() < 1e-12 && cut != 0.0, "{cut} {}", craft.held.input.torque);
+        craft.command(REFERENCE, Demand::Forward(0.0));
+        assert!((cut - craft.held.input.torque).abs() > 1e-3, "else nothing is tested");
     }
 
     #[test]
@@ -600,7 +675,7 @@ mod tests {
             velocity: Vector3::new(0.05, 0.0, 0.0),
             ..InstrumentErrors::default()
         };
-        let (current, stuck_speed) = (Some(Vector3::new(0.0, -0.3, 0.0)), Some(0.25));
+        let (current, stuck_speed) = (Some(Vector3::new(0.5, -0.3, 0.0)), Some(0.25));
         craft.expose(&Conditions { current, errors: Some(errors), stuck_speed, ..Conditions::default() });
         // The laws see v = 0.3 and a vehicle at the left; the record does not.
         assert!((craft.own(REFERENCE).eta - 0.2).abs() < 1e-15);
@@ -610,6 +685,7 @@ mod tests {
         craft.advance(0.02, 1);
         let seen = craft.observe();
         assert!((seen.e_cross + 0.006).abs() < 1e-6 && seen.speed == 0.25, "{seen:?}");
+        assert!((seen.position[0] - 0.75 * 0.02).abs() < 1e-6 && seen.attitude == [craft.state.heading, 0.0, 0.0]);
     }
 
     /// V_p of (3.18), with what the law knows of v̇ where the speed is stuck.
@@ -674,6 +750,7 @@ mod tests {
         craft.command(REFERENCE, Demand::Acceleration(0.1));
         assert!((craft.held.input, craft.sense) == held && craft.is_sound());
         assert_eq!(craft.warnings()[1], Warning { what: REFUSED, count: 6 });
+        assert_eq!(craft.refused(), 6);
     }
 
     #[test]
@@ -687,6 +764,15 @@ mod tests {
         assert_eq!(craft.held.input, held);
         let craft = robot_with(line(), SpeedLoop::Rate { k_0: 1.0 }, Gains::default(), 0.0, 0.5, 0.0);
         assert_eq!((craft.takes(), craft.own(REFERENCE).eta), (DemandKind::Rate, 0.0));
+    }
+
+    #[test]
+    fn what_is_seen_of_it_is_where_it_is() {
+        let mut craft = robot(Line::new(Vector3::new(0.0, 0.0, -3.0), 0.0, 2.0).unwrap(), 1.0, 0.5, 0.25);
+        craft.place_target(2.0);
+        let seen = craft.observe();
+        assert_eq!((seen.position, seen.attitude, seen.psi_e), ([1.0, 0.5, -3.0], [0.25, 0.0, 0.0], 0.25));
+        assert_eq!((seen.e_along, seen.e_cross, seen.e_norm), (-3.0, 0.5, 3f64.hypot(0.5)));
     }
 
     #[test]

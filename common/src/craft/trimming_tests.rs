@@ -22,8 +22,9 @@ use crate::path::chain::{Chain, Segment};
 use crate::path::circle::{Circle, Turn};
 use crate::path::helix::Helix;
 use crate::path::line::Line;
+use crate::path::sinusoid::Sinusoid;
 use crate::vehicle::dynamic_unicycle::{Parameters, State};
-use crate::vehicle::environment::Conditions;
+use crate::vehicle::environment::{Conditions, InstrumentErrors};
 
 const REFERENCE: SpeedReference = SpeedReference { v_l: 0.1, v_l_dot: 0.0 };
 const DT: f64 = 0.02;
@@ -283,4 +284,97 @@ proptest! {
         prop_assert!((one.xi - two.xi).abs() < 1e-8 && (one.e_cross - two.e_cross).abs() < 1e-8);
         prop_assert!((one.psi_e - two.psi_e).abs() < 1e-8);
     }
+}
+
+#[test]
+fn what_is_measured_is_the_state_with_every_error() {
+    let mut craft = craft(circle(2.0, Turn::Left), decoupling(1.0), [2.5, 0.0, 1.6, 0.4]);
+    craft.state.turn_rate = 0.5;
+    let errors = InstrumentErrors {
+        position: Vector3::new(0.125, 0.25, 9.0),
+        heading: 0.0625,
+        velocity: Vector3::new(0.5, 9.0, 9.0),
+        spin: Vector3::new(9.0, 9.0, 0.75),
+    };
+    let foot = craft.observe().xi;
+    craft.expose(&Conditions { errors: Some(errors), ..Conditions::default() });
+    let wanted = State { x: 2.625, y: 0.25, heading: 1.6625, speed: 0.9, turn_rate: 1.25 };
+    assert!((craft.measured().to_vector() - wanted.to_vector()).norm() < 1e-15);
+    // So it believes itself further along its path, in what it tells of itself and not in the record.
+    let own = craft.own(REFERENCE);
+    assert!((own.xi - 0.25f64.atan2(2.625)).abs() < 1e-12 && own.v == 0.9 && (own.eta - 0.7).abs() < 1e-12, "{own:?}");
+    assert_eq!(craft.observe().xi, foot);
+    craft.expose(&Conditions::default());
+    assert_eq!(craft.own(REFERENCE).xi, foot);
+}
+
+#[test]
+fn own_rate_of_r_is_that_of_the_foot() {
+    let path = Sinusoid::new(0.5, 0.0, 4.0, 0.0, 0.0).unwrap();
+    let mut craft = craft(path, decoupling(1.0), [0.3, 0.3, 0.5, 0.4]);
+    let own = craft.own(REFERENCE);
+    craft.command(REFERENCE, Demand::Acceleration(0.0));
+    craft.advance(1e-6, 1);
+    let rate = (craft.own(REFERENCE).r - own.r) / 1e-6;
+    assert!((rate - own.r_dot).abs() < 1e-5 && own.r_dot.abs() > 0.05, "{rate} {own:?}");
+}
+
+#[test]
+fn the_torque_goes_evenly_from_where_the_law_was_to_where_it_comes() {
+    let mut craft = craft(circle(2.0, Turn::Left), decoupling(1.0), [2.5, 0.0, 1.6, 0.4]);
+    for _ in 0..3 {
+        craft.command(REFERENCE, Demand::Acceleration(0.0));
+        let before = craft.state.turn_rate;
+        craft.advance(0.2, 2);
+        let mean = 0.5 * (craft.turning.from + craft.turning.to);
+        assert!((craft.state.turn_rate - before - 0.2 * mean).abs() < 1e-12 && craft.turning.from != craft.turning.to);
+    }
+    assert!(craft.warnings()[2].count == 0 && craft.observe().attitude == [craft.state.heading, 0.0, 0.0]);
+    // A torque at its limit is counted, at either end of the period.
+    craft.limits.torque = 1e-9;
+    craft.command(REFERENCE, Demand::Acceleration(0.0));
+    craft.advance(0.2, 2);
+    assert_eq!((craft.warnings()[2].count, craft.refused()), (1, 0));
+    // From rest the law begins with none, so that only its end is.
+    let mut fresh = self::craft(circle(2.0, Turn::Left), decoupling(1.0), [2.5, 0.0, 1.6, 0.4]);
+    fresh.limits.torque = 1e-9;
+    fresh.command(REFERENCE, Demand::Acceleration(0.0));
+    fresh.advance(0.2, 2);
+    assert!(fresh.turning.from == 0.0 && fresh.warnings()[2].count == 1);
+}
+
+#[test]
+fn at_the_limit_of_its_force_the_law_knows_what_becomes_of_the_speed() {
+    // Asked for more than it has, it turns as one that was asked for what it has; and stuck, as one that was asked for nothing.
+    let turning = |demand: f64, force: f64, stuck_speed: Option<f64>| {
+        let mut craft = craft(circle(2.0, Turn::Left), transformation(1.0), [2.3, 0.0, 1.7, 0.4]);
+        craft.limits.force = force;
+        craft.expose(&Conditions { stuck_speed, ..Conditions::default() });
+        craft.command(REFERENCE, Demand::Forward(demand));
+        craft.advance(0.2, 2);
+        craft.turning.to
+    };
+    let free = f64::INFINITY;
+    assert!((turning(5.0, 0.6, None) - turning(0.2, free, None)).abs() < 1e-12);
+    assert!((turning(5.0, free, Some(0.4)) - turning(0.0, free, None)).abs() < 1e-12);
+    assert!((turning(0.2, free, None) - turning(0.0, free, None)).abs() > 1e-6, "else nothing is tested");
+}
+
+#[test]
+fn a_current_carries_it_and_a_state_that_is_no_number_is_told_of() {
+    let sound = || craft(Line::new(Vector3::zeros(), 0.0, 1.0).unwrap(), decoupling(1.0), [0.0, 0.0, 0.0, 0.4]);
+    let mut adrift = sound();
+    adrift.expose(&Conditions { current: Some(Vector3::new(-0.5, 0.3, 0.0)), ..Conditions::default() });
+    adrift.command(REFERENCE, Demand::Forward(0.0));
+    adrift.advance(0.02, 1);
+    let [x, y, _] = adrift.observe().position;
+    assert!((x + 0.1 * 0.02).abs() < 1e-9 && (y - 0.3 * 0.02).abs() < 1e-9, "{x} {y}");
+    let mut stuck = sound();
+    stuck.expose(&Conditions { stuck_speed: Some(f64::NAN), ..Conditions::default() });
+    let mut forced = sound();
+    forced.force = f64::INFINITY;
+    assert!(sound().is_sound() && !stuck.is_sound() && !forced.is_sound());
+    let mut refusing = sound();
+    refusing.command(REFERENCE, Demand::Forward(f64::NAN));
+    assert_eq!((refusing.refused(), refusing.is_sound()), (1, true));
 }

@@ -71,6 +71,19 @@ mod tests {
         Decoupling::new(Placement::new(lambda_p, 0.05).unwrap(), Derivative::Exact).unwrap()
     }
 
+    #[test]
+    fn what_is_held_is_solved_exactly() {
+        // Two periods are one of twice the length, and a long one ends at rest: N/I = −(k_2 ḋ_e + k_3 ψ̇_e + k_4 d_e)/k_1.
+        let seen = Deviation { r: 0.3, d_e: 0.2, psi_e: -0.1, c_c: 0.5, v: 0.4, v_dot: 0.0 };
+        let after = |periods: &[f64]| {
+            let mut law = law(1.5);
+            law.see(&seen);
+            periods.iter().fold(0.0, |_, &dt| law.advance(dt).to)
+        };
+        assert!((after(&[0.1, 0.1]) - after(&[0.2])).abs() < 1e-12 && (after(&[0.2]) - after(&[0.1])).abs() > 0.01);
+        assert!(law(1.5).rate(after(&[100.0]), &seen).abs() < 1e-9);
+    }
+
     /// The closed loop (2.9) with the law, at constant v: rates of (r, d_e, ψ_e, N/I).
     fn closed_loop(law: &Decoupling, x: &Vector4<f64>, c_c: f64, v: f64) -> Vector4<f64> {
         let seen = Deviation { r: x[0], d_e: x[1], psi_e: x[2], c_c, v, v_dot: 0.0 };

@@ -127,6 +127,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{Controller, Disturbances, design, index, input, output, plant};
+    use crate::following::trimming::Deviation;
     use crate::graph::spectrum::eigenvalues;
 
     /// The closed loop of plant and controller.
@@ -163,6 +164,40 @@ mod tests {
         e.view_mut((0, 0), (3, 4)).copy_from(&c_1);
         e.view_mut((0, 4), (3, 4)).copy_from(&(d_12 * DMatrix::from_row_slice(1, 4, k.c.as_slice())));
         (&e * p * e.transpose()).trace()
+    }
+
+    #[test]
+    fn the_plant_is_2_9_about_trimming() {
+        // By central differences of (2.9) in (r, d_e, ψ_e), without the term −c_c v_e that counts as a disturbance.
+        let (c_c, v, h) = (0.5, 0.4, 1e-5);
+        let found = plant(c_c, v);
+        for column in 0..3 {
+            let rates = |sign: f64| {
+                let [r, d_e, psi_e] = std::array::from_fn(|i| if i == column { sign * h } else { 0.0 });
+                let seen = Deviation { r: c_c * v + r, d_e, psi_e, c_c, v, v_dot: 0.0 };
+                [0.0, seen.d_e_dot(), seen.psi_e_dot(), d_e]
+            };
+            let (ahead, back) = (rates(1.0), rates(-1.0));
+            for row in 0..4 {
+                assert!((found[(row, column)] - (ahead[row] - back[row]) / (2.0 * h)).abs() < 1e-9, "{row} {column}");
+            }
+        }
+        assert!(found.column(3).iter().all(|entry| *entry == 0.0), "the integral moves nothing");
+        assert_eq!((input(), output() * input()), (dvector(&[1.0, 0.0, 0.0, 0.0]), dvector(&[1.0, 0.0, 0.0])));
+    }
+
+    fn dvector(entries: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_column_slice(entries.len(), 1, entries)
+    }
+
+    #[test]
+    fn the_index_and_the_measurements_by_hand() {
+        // r = 1, d_e = 2, ψ_e = 3, z = 4 and N = 5: e = (20·2 + 15·5, 5·4 + 15·5, 50·1 + 10·3 + 75·5).
+        let state = dvector(&[1.0, 2.0, 3.0, 4.0]);
+        let (c_1, d_12) = index();
+        assert_eq!(c_1 * &state + d_12 * 5.0, dvector(&[115.0, 95.0, 455.0]));
+        assert_eq!(output() * state, dvector(&[1.0, 2.0, 4.0]));
+        assert_eq!(Disturbances::default(), Disturbances { heading: 1.0, torque: 1.0, noise: [0.1; 3] });
     }
 
     #[test]

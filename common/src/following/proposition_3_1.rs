@@ -612,7 +612,22 @@ mod tests {
         assert!(with(Approach::Arcsine { k_2: 1.01, epsilon_0: 0.1 }).is_err());
         assert!(with(Approach::Arcsine { k_2: 0.5, epsilon_0: 0.0 }).is_err());
         assert!(with(Approach::Arctangent { psi_a: PI, length: 1.0 }).is_err());
+        assert!(with(Approach::Arcsine { k_2: 1.0, epsilon_0: 0.1 }).is_ok());
         assert!(Proposition31::new(Gains { k_1: 0.0, ..Gains::default() }).is_err());
+        assert!(Proposition31::new(Gains { k_3: 0.0, ..Gains::default() }).is_err());
+        assert!(Proposition31::new(Gains { k_4: -1.0, ..Gains::default() }).is_err());
+    }
+
+    #[test]
+    fn the_target_goes_along_with_the_vehicle_and_waits_for_it() {
+        // ṡ = v cos ψ_e + k₃x_e with k₃ = 0.7.
+        let e = Errors { x_e: 0.3, y_e: 9.0, psi_e: 1.1 };
+        let one = law(Approach::Arcsine { k_2: 0.8, epsilon_0: 0.2 });
+        assert!((one.target_speed(&e, 0.5) - (0.5 * 1.1f64.cos() + 0.21)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_threshold_of_the_sense_is_not_negative() {
         assert!(Proposition31::new(Gains { sense_threshold: -1.0, ..Gains::default() }).is_err());
     }
 

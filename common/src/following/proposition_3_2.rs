@@ -132,4 +132,15 @@ mod tests {
             [one.steer(&off, &motion, &bend, Sense::Forward), law().steer(&off, &motion, &bend, Sense::Forward)];
         assert!((a.phi - b.phi + 0.5 * 0.2 * sigma.cos()).abs() < 1e-15);
     }
+
+    #[test]
+    fn the_target_goes_along_with_the_vehicle_and_waits_for_it() {
+        // ṡ = v cos ψ_e + k₃x_e with k₃ = 0.7.
+        let e = Errors { x_e: 0.3, y_e: 9.0, psi_e: 1.1 };
+        assert!((law().target_speed(&e, 0.5) - (0.5 * 1.1f64.cos() + 0.21)).abs() < 1e-15);
+        assert_eq!(
+            law().target_speed(&e, 0.5),
+            law().steer(&e, &Motion { v: 0.5, ..Motion::default() }, &Bend::of(&path().at(0.0)), Sense::Forward).s_dot
+        );
+    }
 }

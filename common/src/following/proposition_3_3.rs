@@ -183,4 +183,11 @@ mod tests {
         let on = law().slip(wanted(3.0).beta, &wanted(3.0));
         assert_eq!((on.beta_dot, on.beta_ddot), (wanted(3.0).beta_dot, wanted(3.0).beta_ddot));
     }
+
+    #[test]
+    fn the_target_goes_along_with_the_flow_and_waits_for_it() {
+        // ṡ = v_t cos ψ_e + k₃x_e with k₃ = 0.7.
+        let e = Errors { x_e: 0.3, y_e: 9.0, psi_e: 1.1 };
+        assert!((law().target_speed(&e, 0.5) - (0.5 * 1.1f64.cos() + 0.21)).abs() < 1e-15);
+    }
 }

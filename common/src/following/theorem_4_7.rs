@@ -476,7 +476,9 @@ pub(crate) mod tests {
             ..*sirene().parameters()
         };
         let auv = Auv::new(parameters).expect("valid");
-        let law = Theorem47::new(Gains::default(), auv).expect("valid");
+        // No gain is one, nor like another: each must be where it belongs.
+        let gains = Gains { k_e: 0.6, k_phi: 1.7, k_z: 3.0, k_eta: 0.8, delta1: -0.3 };
+        let law = Theorem47::new(gains, auv).expect("valid");
         (ClosedLoop { law, motion, v_r, v_n_dot, gamma_sign }, x)
     }
 
@@ -507,9 +509,14 @@ pub(crate) mod tests {
     #[test]
     fn the_rates_of_the_wanted_turning_rates_are_exact() {
         let mut random = Stream::new(48, "wanted rates");
+        let mut limited = 0;
         for case in 0..100 {
-            let (closed, x) = random_loop(&mut random, TargetMotion::TypeI, 1.0);
-            let exact = closed.evaluate(&x).2.w_d_dot;
+            let (closed, mut x) = random_loop(&mut random, TargetMotion::TypeI, 1.0);
+            // Every other one far beyond the bound of δ, where a divisor is held.
+            x[15] *= if case % 2 == 0 { 1.0 } else { 20.0 };
+            let at = closed.evaluate(&x).2;
+            limited += u32::from(at.limited);
+            let exact = at.w_d_dot;
             for axis in 0..2 {
                 let wanted = |x: &Loop| x[11 + axis] - closed.evaluate(x).2.z_2[axis];
                 let measured = closed.derivative(&x, wanted);
@@ -517,6 +524,7 @@ pub(crate) mod tests {
                 assert!((measured - exact[axis]).abs() < 1e-6 * scale, "case {case}: {measured} {}", exact[axis]);
             }
         }
+        assert!((10..90).contains(&limited), "{limited}");
     }
 
     #[test]
@@ -627,12 +635,73 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn what_is_predicted_is_where_the_law_rests() {
+        // Errata 4.12 and 4.14 on a straight level path: there the body neither gains nor loses speed, and neither does the
+        // target under (4.53).
+        let gains = Gains { k_e: 0.6, k_phi: 1.7, k_z: 3.0, k_eta: 0.8, delta1: -0.3 };
+        let (auv, stretch, v_n, v_r) = (sirene(), 0.7, 0.5, 0.45);
+        let law = Theorem47::new(gains, auv).expect("valid");
+        let still = Vector3::zeros();
+        let point = PathPoint { p: still, d1: Vector3::new(stretch, 0.0, 0.0), d2: still, d3: still };
+        let rest = |rate: f64| {
+            let state = AuvState {
+                velocity: Vector3::new(rate * stretch, 0.0, 0.0),
+                ..AuvState::at_rest(
+                    Vector3::new(gains.predicted_bias_at(&auv, (rate - v_n) * stretch), 0.0, 0.0),
+                    UnitQuaternion::identity(),
+                )
+            };
+            let at = law.evaluate(&state, &point, TargetRate { nominal: v_n, nominal_dot: 0.0, actual: rate });
+            let force = auv.force(&state.velocity, &vertical_in_body(&state.attitude));
+            (auv.acceleration(&state.velocity, &state.spin, &force, at.input.thrust).x, at.alpha_2)
+        };
+        for rate in [v_n, 0.3, 0.62] {
+            assert!(rest(rate).0.abs() < 1e-12, "{rate}: {:?}", rest(rate));
+        }
+        assert_eq!(gains.predicted_bias(&auv), gains.predicted_bias_at(&auv, 0.0));
+        let rate = gains.predicted_rate_type_1(&auv, v_n, v_r, stretch);
+        let (_, alpha_2) = rest(rate);
+        assert!((-alpha_2 - gains.k_eta * (rate - v_r)).abs() < 1e-12 && (rate - v_r).abs() > 1e-3, "{rate} {alpha_2}");
+    }
+
+    #[test]
+    fn erratum_4_11_the_bound_of_delta_1_and_where_the_solve_is_limited() {
+        let of_mass = |y: f64, z: f64| {
+            let parameters = AuvParameters { mass: Vector3::new(4.0, y, z), ..*sirene().parameters() };
+            Auv::new(parameters).expect("positive")
+        };
+        // Whichever axis differs most from the x-axis, to either side.
+        for (y, z) in [(7.0, 5.0), (5.0, 7.0), (1.0, 5.0), (5.0, 1.0)] {
+            let smallest = Gains::smallest_delta1(&of_mass(y, z), -0.5, 0.8);
+            assert!((smallest - 0.5 * 0.8 * 3.0 / 4.0).abs() < 1e-15, "{y} {z}: {smallest}");
+        }
+        // Tail-first, q = −|p'|: the divisors are −m₁₁|δ₁| + v_n(m₃₃ − m₁₁)|p'| and m₁₁|δ₁| − v_n(m₂₂ − m₁₁)|p'|, each limited
+        // where less than 5 % of m₁₁|δ₁| is left, and never where its masses are equal.
+        let still = Vector3::zeros();
+        let point = PathPoint { p: still, d1: Vector3::new(-0.8, 0.0, 0.0), d2: still, d3: still };
+        let state = AuvState::at_rest(still, UnitQuaternion::identity());
+        for (y, z) in [(7.0, 4.0), (4.0, 7.0)] {
+            let law = Theorem47::new(Gains::default(), of_mass(y, z)).expect("valid");
+            let limited = |left: f64| {
+                let nominal = (1.0 - left) * 4.0 * 0.3 / (3.0 * 0.8);
+                law.evaluate(&state, &point, TargetRate { nominal, nominal_dot: 0.0, actual: nominal }).limited
+            };
+            assert!(!limited(0.055) && limited(0.045) && limited(-0.5), "{y} {z}");
+        }
+        let equal = Theorem47::new(Gains::default(), of_mass(4.0, 4.0)).expect("valid");
+        let fast = TargetRate { nominal: 9.0, nominal_dot: 0.0, actual: 9.0 };
+        assert!(!equal.evaluate(&state, &point, fast).limited);
+    }
+
+    #[test]
     fn unsuitable_gains_are_refused_with_the_reason() {
         let (auv, stretch) = (sirene(), Helix::stretch());
         let reason = |gains: Gains| gains.validate(&auv, 0.5, stretch).expect_err("must be refused");
         assert!(Gains::default().validate(&auv, 0.5, stretch).is_ok());
         assert!(reason(Gains { delta1: 0.3, ..Gains::default() }).contains("tail-first"));
         assert!(reason(Gains { delta1: -0.09, ..Gains::default() }).contains("must exceed 0.098"));
+        assert!(reason(Gains { delta1: f64::NEG_INFINITY, ..Gains::default() }).contains("tail-first"));
+        assert!(reason(Gains { k_z: f64::INFINITY, ..Gains::default() }).contains("k_z must be positive"));
         assert!(
             reason(Gains { k_z: 0.0, k_e: f64::NAN, ..Gains::default() })
                 .contains("k_e must be positive, not NaN; k_z")

@@ -226,4 +226,16 @@ mod tests {
             prop_assert_eq!(placement.gains(c_c, v), placement.gains(-c_c, v));
         }
     }
+
+    #[test]
+    fn equations_2_9_and_2_10_by_hand() {
+        // 1 − d_e c_c = 0.8 for a turn to the left with the vehicle to the left of the path.
+        let seen = Deviation { d_e: 0.4, psi_e: 0.3, c_c: 0.5, v: 0.6, v_dot: 0.0, r: 0.7 };
+        let s_dot = 0.6 * 0.3f64.cos() / 0.8;
+        assert!((seen.s_dot() - s_dot).abs() < 1e-15 && (seen.d_e_dot() - 0.6 * 0.3f64.sin()).abs() < 1e-15);
+        assert!((seen.psi_e_dot() - (0.7 - 0.5 * s_dot)).abs() < 1e-15 && (seen.eta() - 0.4).abs() < 1e-15);
+        // Half way to the centre of curvature, on circles of 2 m and of ½ m, is not near it; nine tenths and more are.
+        let at = |d_e, c_c| Deviation { d_e, c_c, ..Deviation::default() }.is_singular();
+        assert!(!at(1.0, 0.5) && !at(0.25, 2.0) && at(1.9, 0.5) && at(0.475, 2.0));
+    }
 }

@@ -274,6 +274,15 @@ mod tests {
         assert!(new(0.5, 1.0, 0.0).is_err() && new(0.5, -1.0, 1.0).is_err() && new(f64::NAN, 1.0, 1.0).is_err());
         let apart = Signals::new(3, &STAR[..2], allowance(0.5, 1.0, 1.0), Time::from_secs(10.0));
         assert!(apart.unwrap_err().contains("never connect"));
+        let two_sources = Signals::new(3, &[(1, 0), (1, 2)], allowance(0.5, 1.0, 1.0), Time::from_secs(10.0));
+        assert!(two_sources.unwrap_err().contains("never connect"), "joined is not enough");
+        // A mission has at least one dwell time, and the last one may be cut.
+        let slots = |end: f64| {
+            Signals::new(3, &STAR, allowance(0.5, 1.0, 1.0), Time::from_secs(end))
+                .map(|found| found.starts()[0].0.len())
+        };
+        assert!(slots(0.0).is_err() && slots(1_000_001.0).is_err());
+        assert_eq!((slots(0.5), slots(1.0), slots(1.5)), (Ok(1), Ok(1), Ok(2)));
     }
 
     proptest! {
@@ -293,5 +302,40 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn losses_can_be_spread_evenly() {
+        // A quarter of the time, every fourth slot.
+        let signals = signals(&STAR, allowance(0.25, 10.0, 1.0), 100.0);
+        let even = measured(&signals, &STAR, &signals.starts()[2], 100.0);
+        assert_eq!((even.loss_time(), even.longest_outage()), (Span::from_secs(25.0), Span::from_secs(1.0)));
+        assert_eq!(even.most_lost_in(Span::from_secs(4.0)), Span::from_secs(1.0));
+    }
+
+    #[test]
+    fn what_is_connected_with_fewer_links_counts_only_if_they_are_among_them() {
+        // 1–2 and 2–3 two-way, and 3 hears 1: each two of the three connect them, and none of these within another.
+        let arcs = [(0, 1), (1, 0), (1, 2), (2, 1), (2, 0)];
+        let signals = signals(&arcs, allowance(0.5, 10.0, 1.0), 100.0);
+        let sizes: Vec<usize> =
+            signals.graphs().iter().filter(|graph| graph.can_agree()).map(|g| g.arcs().count()).collect();
+        assert_eq!(sizes.iter().sum::<usize>(), 4 + 3 + 3, "{sizes:?}");
+    }
+
+    #[test]
+    fn of_few_links_all_sets_are_looked_at_and_of_many_those_next_to_all_and_none() {
+        // A row is connected only whole.
+        let of = |n: usize| {
+            let arcs: Vec<(usize, usize)> = (1..n).flat_map(|i| [(i, i - 1), (i - 1, i)]).collect();
+            let signals = Signals::new(n, &arcs, allowance(0.5, 10.0, 1.0), Time::from_secs(9.0)).expect("admitted");
+            let mut links: Vec<usize> = signals.graphs()[1..].iter().map(|graph| graph.arcs().count() / 2).collect();
+            links.sort();
+            (signals.graphs()[0].arcs().count() / 2, links)
+        };
+        let (whole, others) = of(11);
+        assert_eq!((whole, others.len()), (10, (1 << 10) - 1));
+        let (whole, others) = of(12);
+        assert_eq!((whole, others), (11, [vec![0], vec![1; 11], vec![10; 11]].concat()));
     }
 }

@@ -246,6 +246,8 @@ fn members(row: &[u64]) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::Graph;
+    use crate::graph::incidence::incidence;
+    use crate::graph::rows;
     use nalgebra::{DVector, dmatrix, dvector};
     use proptest::prelude::*;
 
@@ -265,6 +267,18 @@ mod tests {
         assert_eq!(graph.globally_reachable(), [1]);
         assert!(graph.can_agree() && graph.is_connected() && !graph.is_undirected());
         assert_eq!(graph.normalised_laplacian(), dmatrix![1., -0.5, -0.5; 0., 0., 0.; -1., 0., 1.]);
+    }
+
+    #[test]
+    fn a_weight_on_each_link_is_mwm_of_3_62() {
+        let graph = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        let weights = dmatrix![0., 2., 5.; 2., 0., 9.; 5., 9., 0.];
+        let weighted = graph.weighted_laplacian(|i, j| weights[(i, j)]);
+        assert_eq!(weighted, dmatrix![7., -2., -5.; -2., 2., 0.; -5., 0., 5.]);
+        let m = incidence(3, &[(0, 1), (0, 2)]);
+        assert_eq!(weighted, &m * dmatrix![2., 0.; 0., 5.] * m.transpose());
+        assert_eq!(graph.weighted_laplacian(|_, _| 1.0), graph.laplacian());
+        assert_eq!(rows(&dmatrix![1., 2.; 3., 4.]), [[1.0, 2.0], [3.0, 4.0]], "as it is written");
     }
 
     #[test]
@@ -288,6 +302,7 @@ mod tests {
     #[test]
     fn the_extreme_sizes_work() {
         assert!(!Graph::empty(0).can_agree() && Graph::empty(0).is_connected());
+        assert!(Graph::empty(0).is_empty() && !Graph::empty(1).is_empty());
         assert!(Graph::empty(1).can_agree() && Graph::empty(1).is_connected());
         assert!(!Graph::empty(2).can_agree());
     }

@@ -156,6 +156,8 @@ mod tests {
         let m = incidence(3, &FIGURE_3_1);
         assert_eq!(m, dmatrix![-1., 1.; 1., 0.; 0., -1.]);
         assert_eq!(&m * m.transpose(), Graph::from_edges(3, &FIGURE_3_1).laplacian());
+        // Each link once, whichever way it works.
+        assert_eq!(orientation(&Graph::from_arcs(3, &[(0, 1), (2, 0), (2, 1), (1, 2)])), [(0, 1), (0, 2), (1, 2)]);
     }
 
     #[test]

@@ -345,8 +345,44 @@ mod tests {
         assert_eq!((run.loss_time(), run.length()), (s(3.0), s(10.0)));
         assert_eq!((run.shortest_outage(), run.longest_outage()), (Some(s(2.0)), s(2.0)));
         assert_eq!((run.dwell(), run.connected_in_mean()), (Some(s(2.0)), Some(s(2.0))));
+        // α is taken into [0, 1], T_0 is not negative.
+        assert_eq!((run.t_0(1.0), run.t_0(1.5)), (s(2.0), s(2.0)));
+        assert_eq!((run.t_0(-0.5), run.alpha(s(-1.0))), (run.t_0(0.0), run.alpha(Span::ZERO)));
+        assert_eq!((run.most_lost_in(s(-1.0)), run.most_lost_in(s(99.0))), (Span::ZERO, s(3.0)));
         run.advance(at(12.0));
         assert_eq!((run.longest_outage(), run.connected_in_mean()), (s(3.0), Some(s(3.0))));
+    }
+
+    #[test]
+    fn the_shortest_outage_is_the_shortest_of_those_that_ended() {
+        let mut run = Connectivity::new();
+        for (second, connected) in
+            [(0.0, false), (3.0, true), (4.0, false), (4.5, true), (6.0, false), (8.0, true), (9.0, false)]
+        {
+            run.connected(at(second), connected);
+        }
+        run.advance(at(9.25));
+        assert_eq!((run.shortest_outage(), run.longest_outage()), (Some(s(0.5)), s(3.0)));
+        assert_eq!(run.dwell(), Some(s(0.5)), "of all times between two changes, not the last");
+    }
+
+    #[test]
+    fn who_is_joined_but_has_no_common_source_is_not_connected() {
+        // 1 hears 0 and 2, who hear nobody, until 0 hears 2: then all hear 2.
+        let (two_sources, link) = (Graph::from_arcs(3, &[(1, 0), (1, 2)]), Graph::from_arcs(3, &[(0, 2)]));
+        let mut run = Connectivity::new();
+        run.graph(at(0.0), two_sources.clone());
+        run.graph(at(3.0), two_sources.union(&link));
+        run.graph(at(4.0), two_sources.clone());
+        run.advance(at(6.0));
+        assert_eq!((run.loss_time(), run.longest_outage()), (s(5.0), s(3.0)));
+        assert_eq!(run.connected_in_mean(), Some(s(3.0)));
+        let mut never = Connectivity::new();
+        never.graph(at(0.0), two_sources.clone());
+        never.graph(at(1.0), Graph::from_arcs(3, &[(1, 0)]));
+        never.graph(at(2.0), two_sources);
+        never.advance(at(9.0));
+        assert_eq!(never.connected_in_mean(), None);
     }
 
     #[test]

@@ -301,6 +301,12 @@ pub(crate) mod tests {
         assert_eq!(lambda_m(&[Graph::empty(3)], &[1.0; 3]), None, "never connected");
         assert_eq!(lambda_m(&[Graph::from_arcs(2, &[(0, 1)])], &[1.0; 2]), None, "one-way");
         assert_eq!(lambda_m(&[Graph::complete(1)], &[1.0]), None, "nobody to disagree with");
+        let one_of_them = [Graph::complete(3), Graph::from_arcs(3, &[(0, 1)])];
+        assert_eq!(lambda_m(&one_of_them, &[1.0; 3]), None, "one is one-way");
+        assert_eq!(lambda_2m(&[Graph::complete(3), Graph::complete(2)], &[1.0; 3]), None, "one is of another size");
+        assert_eq!(lambda_2_weighted(&path, &[1.0, f64::INFINITY, 1.0]), None);
+        assert!(symmetric_eigenvalues(&dmatrix![1.0, 0.0; 0.0, f64::NAN]).is_empty());
+        assert!(symmetric_eigenvalues(&DMatrix::zeros(0, 0)).is_empty());
         assert_eq!(eigenvalues(&dmatrix![f64::NAN]), None);
     }
 

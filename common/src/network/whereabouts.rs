@@ -69,8 +69,8 @@ mod tests {
         assert_eq!(places.distance(0, 1, t), 10f64.hypot(3.0), "from where they start");
         places.said(0, t, t, 6.0);
         assert_eq!(places.distance(0, 1, t), 5.0);
-        places.said(1, t, t, 6.0);
-        assert_eq!(places.distance(0, 1, Time::from_secs(1.1)), 10f64.hypot(3.0), "6 + 10 along the second line");
+        places.said(1, t, t, 5.0);
+        assert_eq!(places.distance(0, 1, Time::from_secs(1.1)), 9f64.hypot(3.0), "5 + 10 along the second line");
     }
 
     #[test]

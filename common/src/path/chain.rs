@@ -203,6 +203,10 @@ mod tests {
         assert_eq!((path.at(-1.0).p.x, path.at(3.0).p.x), (-2.0, 6.0));
         assert_eq!(path.search_range(), (-1.0, 2.0));
         assert_eq!(figure_3_7([2.0, 4.0]).search_range(), (0.0, PI + 12.0));
+        // By the first line and no more, and beyond a last arc not at all.
+        let arc = Segment::Arc { radius: 1.0, sweep: 1.0, xi_length: 0.5 };
+        let path = Chain::new(Vector3::zeros(), 0.0, &[line, arc, line, arc]).unwrap();
+        assert_eq!((path.search_range(), path.joints()), ((-1.0, 3.0), &[1.0, 1.5, 2.5][..]));
     }
 
     #[test]
@@ -214,6 +218,8 @@ mod tests {
         assert!((path.at(2.0).p - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
         assert!(Chain::new(Vector3::zeros(), 0.0, &[corner, line]).is_err());
         assert!(Chain::new(Vector3::zeros(), 0.0, &[line, corner]).is_err());
+        assert!(Chain::new(Vector3::zeros(), 0.0, &[corner, line, corner, line]).is_err());
+        assert!(Chain::new(Vector3::zeros(), 0.0, &[line, corner, line, corner]).is_err());
     }
 
     #[test]

@@ -90,6 +90,9 @@ mod tests {
         let position = Vector3::new(2.0, 0.0, 40.0);
         assert!(closest_parameter(&helix, position, true).abs() < 1e-9);
         assert!((closest_parameter(&helix, position, false) - 0.4).abs() < 0.02);
+        // Seen from above to the last digits, however steeply it climbs; ξ is in laps.
+        let aside = closest_parameter(&helix, Vector3::new(2.0, 0.5, 40.0), true);
+        assert!((helix.at(aside).p.y.atan2(helix.at(aside).p.x) - 0.25f64.atan()).abs() < 1e-9, "{aside}");
     }
 
     #[test]

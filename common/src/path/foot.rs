@@ -208,4 +208,30 @@ mod tests {
             prop_assert!((foot.xi - turn.sign() * angle).abs() < if searched { 1e-7 } else { 1e-12 }, "{}", foot.xi);
         }
     }
+
+    #[test]
+    fn it_is_searched_for_over_all_of_the_path_and_half_a_turn_either_way() {
+        // From anywhere along a line of ten kilometres either way, from one end to the other.
+        let line = Line::new(Vector3::zeros(), 0.0, 1.0).unwrap();
+        for x in [-900.0, -1.0, 1.0, 900.0] {
+            assert!((Foot::locate(&line, Vector2::new(x, 5.0), 0.0).xi - x).abs() < 1e-9, "{x}");
+        }
+        assert!((Foot::locate(&line, Vector2::new(9000.0, 5.0), -9000.0).xi - 9000.0).abs() < 1e-9);
+        // Beyond the centre, to either side, at half a radian per unit of ξ.
+        for radius in [1.0, 4.0] {
+            for turn in [Turn::Left, Turn::Right] {
+                let path = Circle::new(Vector3::zeros(), radius, turn, 0.0, 0.5).unwrap();
+                let start = Foot::locate(&path, Vector2::new(0.9 * radius, 0.0), 0.0);
+                for angle in [-2.5f64, -1.8, 1.8, 2.5] {
+                    let position = 0.7 * radius * Vector2::new(angle.cos(), angle.sin());
+                    let (foot, _) = start.follow(&path, position);
+                    assert!(
+                        (foot.point.p.xy() / radius - position / (0.7 * radius)).norm() < 1e-6,
+                        "{radius} {angle}: {}",
+                        foot.xi
+                    );
+                }
+            }
+        }
+    }
 }

@@ -86,6 +86,24 @@ mod tests {
     }
 
     #[test]
+    fn height_is_along_the_normal() {
+        // cos φ cos λ, cos φ sin λ, sin φ: that of the ellipsoid, not through its centre. It is also the third row of the frame.
+        for (longitude, latitude) in [(-9.1f64, 38.7f64), (120.0, -60.0)] {
+            let at = |height| Place { longitude, latitude, height };
+            let (sin, cos) = latitude.to_radians().sin_cos();
+            let (sin_l, cos_l) = longitude.to_radians().sin_cos();
+            let normal = Vector3::new(cos * cos_l, cos * sin_l, sin);
+            let up = (at(500.0).to_ecef() - at(0.0).to_ecef()) / 500.0;
+            assert!((up - normal).norm() < 1e-9, "{up}");
+            let frame = at(0.0).frame();
+            assert!(
+                (frame * up - Vector3::z()).norm() < 1e-9
+                    && (frame * frame.transpose() - Matrix3::identity()).norm() < 1e-12
+            );
+        }
+    }
+
+    #[test]
     fn a_second_of_arc_is_as_long_as_the_radii_of_curvature_say() {
         let arc = 1.0 / 3600.0;
         let phi = LISBON.latitude.to_radians();
@@ -101,6 +119,7 @@ mod tests {
     fn a_vehicle_that_keeps_its_depth_keeps_its_z() {
         let far = Place { longitude: -9.0, latitude: 38.8, height: -30.0 };
         assert_eq!(LISBON.local(far).z, -30.0);
+        assert_eq!(Place { height: 20.0, ..LISBON }.local(far).z, -50.0, "against the origin's own height");
         assert_eq!(LISBON.local(LISBON), Vector3::zeros());
     }
 
@@ -109,6 +128,9 @@ mod tests {
         assert!(Place { longitude: 181.0, ..LISBON }.checked().is_err());
         assert!(Place { latitude: 95.0, ..LISBON }.checked().unwrap_err().contains("longitude first"));
         assert!(Place { height: f64::NAN, ..LISBON }.checked().is_err());
+        assert!(Place { longitude: -181.0, ..LISBON }.checked().is_err());
+        assert!(Place { height: -12_001.0, ..LISBON }.checked().is_err());
+        assert!(Place { height: 100_001.0, ..LISBON }.checked().is_err());
         assert!(LISBON.checked().is_ok());
     }
 

@@ -44,7 +44,7 @@ mod tests {
 
     use nalgebra::Vector3;
 
-    use super::Line;
+    use super::{Line, REACH};
     use crate::path::Path;
     use crate::path::check::assert_derivatives_agree;
 
@@ -54,6 +54,7 @@ mod tests {
         let point = line.at(1.5);
         assert!((point.p - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-15);
         assert_eq!((point.r(), point.curvature(), point.dr_dxi()), (2.0, 0.0, 0.0));
+        assert_eq!(line.search_range(), (-0.5 * REACH, 0.5 * REACH), "metres, at two per unit");
         assert_derivatives_agree(&line, -4.0);
     }
 

@@ -56,7 +56,7 @@ impl Path for Sinusoid {
 mod tests {
     use std::f64::consts::TAU;
 
-    use super::Sinusoid;
+    use super::{REACH, Sinusoid};
     use crate::path::Path;
     use crate::path::check::assert_derivatives_agree;
 
@@ -71,6 +71,13 @@ mod tests {
         }
         let crest = path.at(0.25);
         assert!((crest.p.y - 2.0).abs() < 1e-15 && (crest.curvature() + TAU * TAU).abs() < 1e-12);
+        // A quarter of a wave ahead, the crest is at zero; and a search goes over a hundred waves either way.
+        let ahead = Sinusoid::new(1.0, 1.0, 3.0, 0.25 * TAU, 0.0).unwrap();
+        assert!((ahead.at(0.0).p.y - 2.0).abs() < 1e-15 && ahead.at(0.1).p.y < 2.0 && ahead.at(0.75).p.y < 1.0 + 1e-12);
+        assert_derivatives_agree(&ahead, 0.3);
+        assert!(
+            (ahead.search_range().1 - REACH * 3.0).abs() < 1e-9 && ahead.search_range().0 == -ahead.search_range().1
+        );
     }
 
     #[test]

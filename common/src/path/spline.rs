@@ -282,4 +282,15 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_vehicle_may_start_a_tenth_before_it_and_end_as_far_behind() {
+        let path = Spline::at_values(harbour(), (0..harbour().len()).map(|i| 5.0 + 2.0 * i as f64).collect()).unwrap();
+        let length = 2.0 * (harbour().len() - 1) as f64;
+        let (from, to) = path.search_range();
+        assert!(
+            (from - (5.0 - 0.1 * length)).abs() < 1e-12 && (to - (5.0 + 1.1 * length)).abs() < 1e-12,
+            "{from} {to}"
+        );
+    }
 }

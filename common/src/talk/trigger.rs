@@ -118,9 +118,9 @@ mod tests {
 
     #[test]
     fn the_threshold_decays_to_its_floor() {
-        let trigger = Trigger::new(Settings { start: 1.0, decay: 0.5, ..settings() }).expect("sound");
-        assert!((trigger.threshold(Time::ZERO) - 1.1).abs() < 1e-12);
-        assert!((trigger.threshold(Time::from_secs(2.0)) - (0.1 + (-1.0f64).exp())).abs() < 1e-12);
+        let trigger = Trigger::new(Settings { start: 2.0, decay: 0.5, ..settings() }).expect("sound");
+        assert!((trigger.threshold(Time::ZERO) - 2.1).abs() < 1e-12);
+        assert!((trigger.threshold(Time::from_secs(2.0)) - (0.1 + 2.0 * (-1.0f64).exp())).abs() < 1e-12);
         assert!((trigger.threshold(Time::from_secs(1e6)) - trigger.floor()).abs() < 1e-12);
     }
 
@@ -134,6 +134,13 @@ mod tests {
         assert!(beats.iter().max() > Some(&s(9.5)) && beats.iter().min() < Some(&s(5.5)));
         assert_eq!(plain.heartbeat(&mut stream, 7), Some(s(10.0)));
         assert_eq!(jittered.heartbeat(&mut stream, 7), Some(beats[7]), "a function of the number");
+        let held = Trigger::new(Settings { jitter: 0.9, least_silence: s(9.0), ..settings() }).expect("sound");
+        assert!((0..100).all(|seq| held.heartbeat(&mut stream, seq).is_some_and(|beat| beat >= s(9.0))));
+        assert_eq!((plain.most_silence(), plain.patience()), (Some(s(10.0)), None));
+        let patient =
+            Trigger::new(Settings { most_silence: None, patience: Some(s(2.0)), ..settings() }).expect("sound");
+        assert_eq!((patient.most_silence(), patient.patience()), (None, Some(s(2.0))));
+        assert_eq!(patient.heartbeat(&mut stream, 7), None, "who waits for an answer needs none");
     }
 
     #[test]

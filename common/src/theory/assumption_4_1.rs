@@ -159,11 +159,40 @@ mod tests {
         for wrong in [
             Assumption41 { lambda_1: 0.0, ..sound },
             Assumption41 { alpha: 0.6, ..sound },
+            Assumption41 { rho_1: -0.1, ..sound },
             Assumption41 { rho_2: -0.1, ..sound },
+            Assumption41 { alpha: 0.0, ..sound },
+            Assumption41 { alpha: -0.5, alpha_bar: -0.5, ..sound },
+            Assumption41 { alpha_bar: f64::INFINITY, ..sound },
             Assumption41 { alpha_bar: f64::NAN, ..sound },
         ] {
             assert!(wrong.checked().is_err(), "{wrong:?}");
         }
         assert_eq!(sound.checked(), Ok(sound));
+    }
+
+    #[test]
+    fn what_starts_and_what_moves_it_each_have_their_term() {
+        // One at a time, for ζ' = −ζ + v + d from ζ(0): the others' terms cannot make up for a lost one.
+        let bound = first_order(1.0).bound();
+        for (start, v, d) in [(10.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, 3.0)] {
+            let settled: f64 = v + d;
+            for t in [0.0f64, 0.5, 2.0, 40.0] {
+                let zeta = settled + (start - settled) * (-t).exp();
+                let most = bound.at(start, t, v, d);
+                assert!(zeta <= most * (1.0 + 1e-12), "{start} {v} {d} at {t}: {zeta} > {most}");
+            }
+        }
+        // And they add up: 2·7e^(−1) + 3·11 + 5·13.
+        let known = Bound { overshoot: 2.0, rate: 0.5, of_speed: 3.0, of_disturbance: 5.0 };
+        assert!((known.at(7.0, 2.0, 11.0, 13.0) - (14.0 * (-1.0f64).exp() + 98.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_gains_have_the_lower_bound_of_w_in_them_and_each_its_own_rho() {
+        // λ_1α = 1: √3 and √5; with ᾱ in place of α, as printed, half of that (erratum 4.5).
+        let bound = Assumption41 { lambda_1: 2.0, rho_1: 3.0, rho_2: 5.0, alpha: 0.5, alpha_bar: 2.0 }.bound();
+        assert!((bound.of_speed - 3f64.sqrt()).abs() < 1e-12 && (bound.of_disturbance - 5f64.sqrt()).abs() < 1e-12);
+        assert!(bound.overshoot == 2.0 && bound.rate == 1.0);
     }
 }

@@ -167,6 +167,7 @@ mod tests {
         #[test]
         fn gains_place_all_four_roots(lambda_p in 0.2..2.0f64, c_c in -1.0..1.0f64, v in 0.1..1.0f64) {
             let polynomial = path_following(gains(lambda_p, c_c, v), c_c, v);
+            prop_assert_eq!(polynomial.len(), 5);
             for (found, expected) in polynomial.iter().zip(shifted_power(lambda_p, 4)) {
                 prop_assert!((found - expected).abs() < 1e-12 * (1.0 + expected));
             }
@@ -179,6 +180,16 @@ mod tests {
                 is_hurwitz(&coupled(lambda_p, m * lambda_p, k))
             };
             prop_assert!(stable(m_0() * (1.0 + part)) && !stable(m_0() * (1.0 - 0.9 * part)));
+        }
+
+        #[test]
+        fn above_the_critical_lambda_p_it_is_stable_and_below_it_is_not(
+            log_xi in -4.0..3.0f64, log_k in -6.0..3.0f64, part in 0.01..1.0f64
+        ) {
+            let (xi, k) = (log_xi.exp(), log_k.exp());
+            let critical = critical_lambda_p(xi, k);
+            let stable = |lambda_p: f64| is_hurwitz(&coupled(lambda_p, xi, k));
+            prop_assert!(stable(critical * (1.0 + part)) && !stable(critical * (1.0 - 0.9 * part)), "{}", critical);
         }
     }
 
@@ -209,6 +220,9 @@ mod tests {
         let stable: Vec<bool> = locus.iter().map(|(_, roots)| roots.iter().all(|root| root.re < 0.0)).collect();
         assert_eq!(stable.windows(2).filter(|pair| pair[0] != pair[1]).count(), 1);
         assert!(!stable[0] && stable[250] && locus.iter().all(|(_, roots)| roots.len() == 7));
+        assert!(locus[0].0 == 0.13 && (locus[125].0 - 1.38).abs() < 1e-12 && (locus[250].0 - 2.63).abs() < 1e-12);
+        let one: Vec<f64> = root_locus(0.4, 0.25, 0.5, 2.0, 0).iter().map(|(lambda_p, _)| *lambda_p).collect();
+        assert_eq!(one, [0.5], "no steps: where it begins");
     }
 
     #[test]

@@ -144,6 +144,11 @@ mod tests {
         assert!(!holds(DelayGains::Fixed(&[0.1; 3], &graphs), 5.0, true));
         assert!(holds(DelayGains::Fixed(&[0.1; 3], &graphs), 0.0, true));
         assert!(holds(DelayGains::Fixed(&[0.05, 0.1, 0.1], &graphs), 5.0, true));
+        assert!(!holds(DelayGains::Averaged(f64::INFINITY), 5.0, true));
+        let words = |tau| verdict(DelayGains::Fixed(&[0.1; 3], &graphs), s(tau), 0.5, true).value;
+        assert!(words(5.0).contains("errors remain") && words(0.0).contains("no delay"));
+        let connected = |connected| verdict(DelayGains::Averaged(0.2), s(5.0), 0.5, connected).value;
+        assert!(connected(false).starts_with("not connected in mean") && connected(true).starts_with("v_L*"));
         assert!(verdict(DelayGains::Averaged(0.2), s(5.0), 0.5, true).value.contains("v_L* = 0.2500"));
     }
 
@@ -152,6 +157,9 @@ mod tests {
         assert_eq!(settled(&Graph::empty(2), &[1.0; 2], 1.0, s(1.0)), None);
         assert_eq!(settled(&star(), &[1.0, 0.0, 1.0], 1.0, s(1.0)), None);
         assert_eq!(settled(&star(), &[1.0; 2], 1.0, s(1.0)), None);
+        assert_eq!(settled(&star(), &[1.0, f64::INFINITY, 1.0], 1.0, s(1.0)), None);
+        let prompt = settled(&star(), &[1.0; 3], 1.0, s(0.0));
+        assert_eq!(settled(&star(), &[1.0; 3], 1.0, s(-5.0)), prompt, "news do not come before they are said");
         let alone = settled(&Graph::empty(1), &[1.0], 1.0, s(1.0)).expect("a fleet of one");
         assert_eq!((alone.speed, alone.errors.len()), (1.0, 1));
     }

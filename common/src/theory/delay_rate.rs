@@ -129,6 +129,12 @@ mod tests {
         assert_eq!(rate(&Graph::empty(2), 0.1, Span::ZERO), None);
         assert_eq!(rate(&star, 0.0, Span::ZERO), None);
         assert_eq!(rate(&Graph::from_arcs(2, &[(0, 1)]), 0.1, Span::ZERO), None, "vehicle 1 hears nobody");
+        let two_pairs = Graph::from_edges(4, &[(0, 1), (2, 3)]);
+        assert_eq!(rate(&two_pairs, 0.1, Span::from_secs(1.0)), None, "all hear somebody, and yet not all agree");
+        let between_two = Graph::from_arcs(5, &[(0, 1), (1, 0), (2, 3), (3, 2), (4, 0), (4, 2)]);
+        assert_eq!(rate(&between_two, 0.1, Span::from_secs(1.0)), None, "nor if somebody hears both");
+        // μ = 0: who hears only those that have settled follows at k.
+        assert_eq!(rightmost(0.3, Complex::from(0.0), Span::from_secs(2.0)), Complex::from(-0.3));
     }
 
     proptest! {

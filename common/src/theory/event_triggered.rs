@@ -71,6 +71,14 @@ mod tests {
         for n in 2..8 {
             assert!((gain(&Graph::complete(n)).expect("connected") - (n as f64).sqrt().recip()).abs() < 1e-9);
         }
+        // A star of three: ΠA has rank one, with ‖ΠA‖ = √2; λ_2 = 1, λ_max = 3, the centre has two neighbours.
+        let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        assert!((gain(&star).expect("connected") - 6f64.sqrt()).abs() < 1e-9);
+        let room = 1.0 - 0.2 * 0.1 * (3.0 * 6f64.sqrt() + 2.0);
+        let error = belief_error(&star, 0.1, 0.5, 0.2).expect("bounded");
+        assert!((error - 0.5 / room).abs() < 1e-9, "{error}");
+        let bound = ultimate_bound(&star, 0.1, 0.5, 0.2).expect("bounded");
+        assert!((bound - 6f64.sqrt() * 0.5 / room).abs() < 1e-9, "{bound}");
         assert!(
             (belief_error(&pair(), 0.1, 1.0, 1.0).expect("bounded") - 1.0 / (1.0 - 0.1 * (2f64.sqrt() + 1.0))).abs()
                 < 1e-9

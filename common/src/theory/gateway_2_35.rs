@@ -213,6 +213,17 @@ mod tests {
     }
 
     #[test]
+    fn who_is_stuck_is_no_follower_more() {
+        // (2.35) has q for all followers but one, (2.42) for all but two.
+        for (n, nominal, failed) in [(2, 1, 1), (3, 2, 1), (4, 2, 2)] {
+            let fleet = Gateway { n, ..section_2_5_3(false) };
+            assert_eq!((fleet.factors(false).len(), fleet.factors(true).len()), (nominal, failed), "{n}");
+        }
+        let [alive, stuck] = [false, true].map(|failed| section_2_5_3(false).verdict(failed).name);
+        assert!(stuck.contains("failed") && !alive.contains("failed"));
+    }
+
+    #[test]
     fn section_2_5_3_leaves_0_083_rad() {
         let error = section_2_5_3(false).steady_error(0.25, 3.0, 0.2, 2.0);
         assert!((error + 0.083_333).abs() < 1e-6, "{error}");
@@ -309,7 +320,8 @@ mod tests {
         fn an_unstable_follower_makes_an_unstable_gateway(a in 0.2..4.0f64, b in 0.1..4.0f64, part in 1.05..3.0f64,
             b_0 in 0.01..20.0f64, n in 3usize..7) {
             let fleet = Gateway { a, distance: vec![b, part * a * b], b_0, n };
-            prop_assert!(!fleet.verdict(false).holds);
+            let verdict = fleet.verdict(false);
+            prop_assert!(!verdict.holds && verdict.norm_rate.is_none());
         }
     }
 }

@@ -95,6 +95,7 @@ mod tests {
         assert!((slowest - decay(0.1, 2.0).min(decay(0.3, 2.0))).abs() < 1e-12);
         assert_eq!(agreement_rate(&Graph::from_arcs(2, &[(0, 1)]), 0.1, tau), None);
         assert_eq!(agreement_rate(&Graph::empty(1), 0.1, tau), None);
+        assert_eq!(turn(&Graph::empty(1), 0.1, tau), None);
         assert_eq!(agreement_rate(&Graph::empty(2), 0.1, tau), Some(0.0), "nobody agrees");
     }
 

@@ -69,6 +69,14 @@ mod tests {
         assert!((alpha(&run, s(4.0)) - 0.5).abs() < 1e-9);
         // The true solution meets the rate exactly over each period: x(3k) = e^{-0.4k} x(0).
         assert!((rate(0.2, 1.0 / 3.0) * 3.0 - 0.4).abs() < 1e-12);
+        // So nothing decays faster than the bound, which stays above it by b = e^{0.4}, no more.
+        for periods in 0..5 {
+            let solution = (-0.4 * f64::from(periods)).exp();
+            let promised = bound(0.2, 1.0 / 3.0, s(3.0), s(3.0 * f64::from(periods)));
+            assert!((promised / solution - 0.4f64.exp()).abs() < 1e-12, "{periods}");
+        }
+        // A window may be all silence; and of none there is no part.
+        assert_eq!((alpha(&run, s(0.5)), alpha(&run, Span::ZERO)), (1.0, 0.0));
     }
 
     #[test]

@@ -332,6 +332,8 @@ mod tests {
         let fleet = example_4_1(1.6);
         let good = fleet.verdict(0.75);
         assert!(good.holds && good.norm_rate.is_some_and(|rate| rate > 0.0), "{good:?}");
+        assert_eq!(good.norm_rate, fleet.best(0.75).map(|best| 0.5 * best.rate_of_v(0.75)), "half of that of V");
+        assert!(fleet.largest_lambda_c(-0.1).is_none(), "V may not fall without connection");
         let never = fleet.verdict(1.0);
         assert_eq!((never.holds, never.norm_rate), (false, None));
         assert!(Dynamic::new(1.0, 1.0, &[Graph::empty(3)]).is_none(), "never connected");
@@ -409,15 +411,102 @@ mod tests {
             run.advance(t);
             let alpha = run.loss_fraction();
             let best = fleet.best(alpha).expect("connected at times");
-            let (rate, overshoot) = (0.5 * best.rate_of_v(alpha), best.overshoot(alpha, run.t_0(alpha)));
-            let mut state = DVector::from_fn(2 * n, |_, _| stream.uniform(-3.0, 3.0));
-            let (start, mut t) = (norm(&state), 0.0);
-            for (graph, lasts) in &phases {
-                state = (closed(graph, a_1, a_2) * lasts.secs()).exp() * state;
-                t += lasts.secs();
-                let promised = overshoot * (-rate * t).exp() * start;
-                prop_assert!(norm(&state) <= promised * (1.0 + 1e-9) + 1e-9, "{} > {} at {}", norm(&state), promised, t);
+            // And by any other X, under which V may grow without connection.
+            let other = fleet.certify(&Matrix2::new(1.0, 0.0, 0.0, stream.uniform(0.5, 4.0))).expect("positive definite");
+            let begin = DVector::from_fn(2 * n, |_, _| stream.uniform(-3.0, 3.0));
+            for certificate in [best, other] {
+                let (rate, overshoot) = (0.5 * certificate.rate_of_v(alpha), certificate.overshoot(alpha, run.t_0(alpha)));
+                let (mut state, start, mut t) = (begin.clone(), norm(&begin), 0.0);
+                for (graph, lasts) in &phases {
+                    state = (closed(graph, a_1, a_2) * lasts.secs()).exp() * state;
+                    t += lasts.secs();
+                    let promised = overshoot * (-rate * t).exp() * start;
+                    prop_assert!(norm(&state) <= promised * (1.0 + 1e-9) + 1e-9, "{} > {} at {}", norm(&state), promised, t);
+                }
             }
         }
+    }
+
+    #[test]
+    fn the_spectra_are_the_outermost_of_all_graphs_that_occur() {
+        // In any order: an edge has 2, no edge 0.
+        let (pair, none) = (Graph::from_edges(3, &[(0, 1)]), Graph::empty(3));
+        for graphs in
+            [[Graph::complete(3), pair.clone(), none.clone()], [none.clone(), pair.clone(), Graph::complete(3)]]
+        {
+            let spectra = Spectra::of(&graphs).expect("one is connected");
+            assert!((spectra.disconnected.expect("two are not") - 2.0).abs() < 1e-9, "{spectra:?}");
+            assert!((spectra.connected.0 - 3.0).abs() < 1e-9 && (spectra.connected.1 - 3.0).abs() < 1e-9);
+        }
+        let never = Spectra::of(&[Graph::complete(3), none]).expect("one is connected").disconnected;
+        assert!(never.is_some_and(|most| most.abs() < 1e-9), "{never:?}");
+        assert_eq!(Spectra::of(&[Graph::complete(3)]).expect("connected").disconnected, None);
+        assert!(Dynamic::new(f64::INFINITY, 1.0, &all_graphs(3)).is_none());
+    }
+
+    proptest! {
+        /// (4.65) by its definition: the largest eigenvalue of A(λ)X + XA(λ)' against X, at all λ that occur.
+        #[test]
+        fn a_certificate_says_exactly_what_its_x_shows(
+            a_1 in 0.1..4.0f64, a_2 in 0.1..4.0f64, x in 0.1..9.0f64, rho in -0.95..0.95f64, size in 0.2..5.0f64
+        ) {
+            let y = rho * x.sqrt();
+            let x = Matrix2::new(1.0, y, y, x) * size;
+            let growth = |fleet: &Dynamic, lambda: f64| {
+                let a = fleet.block(lambda);
+                let inverse = x.cholesky().expect("positive definite").l().try_inverse().expect("so is its root");
+                let form = inverse * (a * x + x * a.transpose()) * inverse.transpose();
+                SymmetricEigen::new((form + form.transpose()) * 0.5).eigenvalues.max()
+            };
+            let fleet = Dynamic::new(a_1, a_2, &all_graphs(3)).expect("some graphs are connected");
+            let found = fleet.certify(&x).expect("positive definite");
+            let tolerance = 1e-7 * (1.0 + found.lambda_c.abs() + found.lambda_d);
+            let connected = growth(&fleet, 1.0).max(growth(&fleet, 3.0));
+            prop_assert!((found.lambda_c + connected).abs() < tolerance, "{:?} {}", found, connected);
+            let others = growth(&fleet, 0.0).max(growth(&fleet, 2.0)).max(0.0);
+            prop_assert!((found.lambda_d - others).abs() < tolerance, "{:?} {}", found, others);
+            // Where every graph is connected nothing ever grows.
+            let always = Dynamic::new(a_1, a_2, &[Graph::complete(3)]).expect("connected");
+            prop_assert_eq!(always.certify(&x).map(|found| found.lambda_d), Some(0.0));
+            prop_assert_eq!(fleet.certify(&-x), None);
+        }
+    }
+
+    #[test]
+    fn lemma_4_7_in_closed_form() {
+        // λ_c = 2, λ_d = ½: at α = ¼ V decays at 1.5 − 0.125, α < 4/5 is borne, and X̂ of condition 4 doubles a norm.
+        let known = Certificate { lambda_c: 2.0, lambda_d: 0.5, x: Matrix2::new(2.0, 0.0, 0.0, 8.0) };
+        assert!((known.rate_of_v(0.25) - 1.375).abs() < 1e-12 && (known.alpha_limit() - 0.8).abs() < 1e-12);
+        assert!(known.rate_of_v(0.799) > 0.0 && known.rate_of_v(0.801) < 0.0, "the limit is where the rate is zero");
+        assert!((known.overshoot(0.25, Span::from_secs(2.0)) - 2.0 * 1.875f64.exp()).abs() < 1e-9);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn no_other_x_promises_more_than_the_best(
+            a_1 in 0.2..4.0f64, a_2 in 0.2..4.0f64, alpha in 0.0..0.95f64,
+            others in prop::collection::vec((-4.0..4.0f64, -0.99..0.99f64), 200),
+        ) {
+            let fleet = Dynamic::new(a_1, a_2, &all_graphs(3)).expect("some graphs are connected");
+            let best = fleet.best(alpha).expect("there is one").rate_of_v(alpha);
+            prop_assert!(best >= fleet.calm().rate_of_v(alpha));
+            for (ln_x, rho) in others {
+                let x = (2.0 * (a_1 + a_2).ln() + ln_x).exp();
+                let other = fleet.certify(&Matrix2::new(1.0, rho * x.sqrt(), rho * x.sqrt(), x)).expect("positive definite");
+                prop_assert!(other.rate_of_v(alpha) <= best + 0.02 * best.abs(), "{} {}", other.rate_of_v(alpha), best);
+            }
+        }
+    }
+
+    #[test]
+    fn equation_4_66_where_neither_gain_nor_eigenvalue_is_one() {
+        // a_1 = 2, a_2 = 3 and eigenvalues from 2 to 5: λ_p = 10/7, x = 4·3·7/(8·(12 − 10/7)).
+        let spectra = Spectra { connected: (2.0, 5.0), disconnected: Some(3.0) };
+        let printed = Dynamic { a_1: 2.0, a_2: 3.0, spectra }.printed();
+        let x = 588.0 / 592.0;
+        assert!((printed.x[(1, 1)] - x).abs() < 1e-12 && (printed.lambda_c - 20.0 / 21.0).abs() < 1e-12, "{printed:?}");
+        assert!((printed.lambda_d - ((25.0 + x).sqrt() - 5.0)).abs() < 1e-12, "{printed:?}");
     }
 }

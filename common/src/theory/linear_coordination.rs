@@ -163,6 +163,27 @@ pub(crate) mod tests {
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&Graph::empty(2), &[1.0; 2]), None);
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0]), None);
         assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0, 0.0]), None);
+        assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0, -2.0]), None);
+        assert_eq!(Law::SolutionOne { a: 1.0 }.rate(&pair, &[1.0, f64::INFINITY]), None);
+        let of_three = Graph::complete(3).laplacian();
+        assert_eq!(Law::SolutionOne { a: 1.0 }.late_eigenvalues(&pair, &of_three, &[1.0; 2], Late::default()), None);
+    }
+
+    #[test]
+    fn a_law_sees_itself_half_a_period_late_and_others_one_more() {
+        let held = Late::held(0.2);
+        assert!((held.own - 0.1).abs() < 1e-15 && (held.neighbours - 0.3).abs() < 1e-15);
+        // A pair on R = 2, solution II, c = ½: with x = ξ_1 − ξ_2, (1 − aτ_o)s² + (a − bc²(τ_o + τ_n))s + 2bc² = 0.
+        let (a, b, c, pair) = (1.0, 2.0, 0.5, Graph::complete(2));
+        let late = Late { own: 0.02, neighbours: 0.1 };
+        let found = Law::SolutionTwo { a, b }.late_eigenvalues(&pair, &pair.laplacian(), &[2.0; 2], late);
+        let residual = |s: &Complex<f64>| {
+            let (lead, damping) = (1.0 - a * late.own, a - b * c * c * (late.own + late.neighbours));
+            (s * s * lead + s * damping + 2.0 * b * c * c).norm()
+        };
+        let modes = found.expect("connected");
+        assert_eq!(modes.iter().filter(|s| s.im != 0.0).count(), 2, "{modes:?}");
+        assert!(modes.iter().filter(|s| s.im != 0.0).all(|s| residual(s) < 1e-9), "{modes:?}");
     }
 
     #[test]
@@ -177,6 +198,20 @@ pub(crate) mod tests {
         let prompt = law.rate(&pair, &[1.0; 2]).expect("connected");
         // (1 − aτ)s² + (a − 2bτ)s + 2b = 0.
         assert!((prompt - 0.5).abs() < 1e-12 && (pair_of_modes[0].re + 0.5 * 0.992 / 0.99).abs() < 1e-9);
+    }
+
+    #[test]
+    fn late_news_go_the_way_of_the_link() {
+        // 1 hears 0, who hears nobody, R = 1 and (3.72): 0 comes to v_L by itself, (1 − aτ_o)s + a, and 1 to 0,
+        // (1 − aτ_o)s² + (a − bτ_o)s + b, however late what 0 says is.
+        let (a, b, graph) = (1.0, 0.5, Graph::from_arcs(2, &[(1, 0)]));
+        for neighbours in [0.02, 0.3] {
+            let late = Late { own: 0.02, neighbours };
+            let found = Law::Directed { a, b }.late_eigenvalues(&graph, &graph.laplacian(), &[1.0; 2], late);
+            let (lead, damping) = (1.0 - a * late.own, a - b * late.own);
+            let product = |s: &Complex<f64>| ((s * lead + a) * (s * s * lead + s * damping + b)).norm();
+            assert!(found.expect("it can agree").iter().all(|s| product(s) < 1e-9), "{neighbours}");
+        }
     }
 
     proptest! {

@@ -172,7 +172,7 @@ impl Gains {
 mod tests {
     use std::path::Path;
 
-    use super::{PathFollowing, Underactuated};
+    use super::{Gains, PathFollowing, Underactuated};
 
     #[test]
     fn the_constants_of_theorem_4_7_bear_what_young_says() {
@@ -222,6 +222,88 @@ mod tests {
         for entry in std::fs::read_dir(folder).expect("lists") {
             let name = entry.expect("an entry").file_name().to_string_lossy().into_owned();
             assert!(index.contains(&format!("`theory/{name}`")), "{name} is not in docs/theory.md");
+        }
+    }
+
+    /// Unlike numbers all over, and |v_n| whatever its sign.
+    const VEHICLE: Underactuated = Underactuated {
+        mass: (4.7, 7.6),
+        inertia: (7.5, 7.7),
+        gains: [0.5, 1.3, 4.0, 1.1],
+        fastest: -0.6,
+        stretch: 0.31,
+        bend: 0.2,
+    };
+
+    fn type_1(vehicle: Underactuated) -> (f64, f64, f64) {
+        match vehicle.type_1() {
+            Some(PathFollowing::TypeI { lambda_1, rho_1, alpha_1 }) => (lambda_1, rho_1, alpha_1),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn no_smaller_rho_1_would_do() {
+        // Where e and y = Mφ are worst for a given v~_r, W_4' + λ_1W_4 − ρ_1v~_r² is just zero (z_2 = η = δ = 0).
+        let (lambda_1, rho_1, _) = type_1(VEHICLE);
+        let (m, v) = (7.6, 0.4);
+        let (p, b) = (0.31, 0.6 * 7.6 * 0.2 + 0.5 * 0.31);
+        let (of_e, of_y) = (0.5 / m - 0.5 * lambda_1, 1.3 / m - 0.5 * lambda_1);
+        assert!(of_e > 0.0 && of_y > 0.0, "λ_1 is not too large to be borne");
+        let (e, y) = (p * v / (2.0 * of_e), b * v / (2.0 * of_y));
+        let worst = -of_e * e * e + p * e * v - of_y * y * y + b * y * v;
+        assert!((worst - rho_1 * v * v).abs() < 1e-12 * rho_1, "{worst} {}", rho_1 * v * v);
+    }
+
+    #[test]
+    fn lambda_1_leaves_the_least_coupling_and_some_of_every_term() {
+        let (lambda_1, rho_1, alpha_1) = type_1(VEHICLE);
+        let coupling = |lambda: f64| {
+            let (p, b) = (0.31f64, 0.6f64 * 7.6 * 0.2 + 0.5 * 0.31);
+            (p * p / (4.0 * (0.5 / 7.6 - 0.5 * lambda)) + b * b / (4.0 * (1.3 / 7.6 - 0.5 * lambda))) / (0.5 * lambda)
+        };
+        assert!((coupling(lambda_1) - rho_1 / (alpha_1 * lambda_1)).abs() < 1e-9);
+        assert!([0.5, 0.9, 1.1, 1.2].iter().all(|part| coupling(part * lambda_1) > coupling(lambda_1)));
+        // Whichever term decays slowest, λ_1 stays below twice its rate, and does not stop far from it where nothing else does.
+        let with = |gains| type_1(Underactuated { gains, ..VEHICLE });
+        assert!((0.0198..0.02).contains(&with([0.5, 1.3, 4.0, 0.01]).0), "k_η");
+        assert!((0.99..1.0).contains(&(with([0.5, 1.3, 0.05, 1.1]).0 * 7.7 / 0.1)), "k_z/j");
+        let slow_phi = with([0.5, 0.02, 4.0, 1.1]);
+        assert!(slow_phi.0 < 2.0 * 0.02 / 7.6 && slow_phi.1 > 0.0, "k_φ/m");
+        let slow_e = with([0.02, 1.3, 4.0, 1.1]);
+        assert!(slow_e.0 < 2.0 * 0.02 / 7.6 && slow_e.1 > 0.0, "k_e/m");
+    }
+
+    #[test]
+    fn alpha_1_is_half_of_the_least_of_one_m_squared_and_j() {
+        let of =
+            |mass: f64, inertia: f64| type_1(Underactuated { mass: (mass, 7.6), inertia: (inertia, 7.7), ..VEHICLE }).2;
+        assert!((of(4.7, 7.5) - 0.5).abs() < 1e-12);
+        assert!((of(0.6, 7.5) - 0.18).abs() < 1e-12);
+        assert!((of(0.6, 0.3) - 0.15).abs() < 1e-12);
+        assert!((of(0.6, 0.4) - 0.18).abs() < 1e-12);
+        for wrong in [
+            Underactuated { gains: [0.5, 1.3, f64::INFINITY, 1.1], ..VEHICLE },
+            Underactuated { mass: (0.0, 7.6), ..VEHICLE },
+            Underactuated { inertia: (-1.0, 7.7), ..VEHICLE },
+        ] {
+            assert_eq!(wrong.type_1(), None, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn type_ii_is_not_excited_by_coordination() {
+        assert!((PathFollowing::TypeI { lambda_1: 2.0, rho_1: 3.0, alpha_1: 5.0 }.coupling() - 0.3).abs() < 1e-12);
+        assert_eq!(PathFollowing::TypeII { lambda_1: 2.0 }.coupling(), 0.0);
+    }
+
+    #[test]
+    fn gains_are_positive_and_of_two_vehicles_at_least() {
+        assert_eq!(Gains::new(&[2.0, 0.5, 1.0]), Some(Gains { n: 3, k_m: 0.5, k_max: 2.0 }));
+        assert_eq!(Gains::new(&[0.1, 0.1]), Some(Gains { n: 2, k_m: 0.1, k_max: 0.1 }));
+        let wrong: [&[f64]; 6] = [&[], &[1.0], &[1.0, 0.0], &[-1.0, 1.0], &[1.0, f64::INFINITY], &[f64::NAN, 1.0]];
+        for gains in wrong {
+            assert_eq!(Gains::new(gains), None, "{gains:?}");
         }
     }
 }

@@ -515,6 +515,7 @@ mod tests {
         let watch = watch(&agreement(0.5), &graphs, seen, Vec::new());
         assert_eq!(watch.covered_by, Some("Theorem 4.5"));
         assert!(watch.envelope.is_some_and(|envelope| envelope.rate > 0.0 && envelope.statement == "Theorem 4.5"));
+        assert!(watch.failing().is_empty(), "it is covered");
         let failing: Vec<_> = watch.margins.iter().filter(|margin| !margin.holds()).collect();
         assert!(failing.len() == 1 && failing[0].statement == "Theorem 4.4" && failing[0].left() == 0.0);
     }
@@ -525,6 +526,10 @@ mod tests {
         let covered = watch(&Watched::Dynamic(1.0, 1.6), &graphs, seen, Vec::new());
         assert_eq!(covered.covered_by, Some("Lemma 4.7"));
         assert!(covered.margins[0].left() > 0.0 && covered.envelope.is_some());
+        let best = Dynamic::new(1.0, 1.6, &graphs).and_then(|fleet| fleet.best(0.75)).expect("connected at times");
+        let envelope =
+            Envelope { statement: "Lemma 4.7", factor: best.overshoot(0.75, s(7.5)), rate: 0.5 * best.rate_of_v(0.75) };
+        assert_eq!(covered.envelope, Some(envelope), "norms decay at half the rate of V");
         // With the X that is found it bears this loss rate too, where that of (4.66) does not.
         let (graphs, rarely) = row_of_three(0.02, 1000.0);
         let watch = watch(&Watched::Dynamic(1.0, 0.05), &graphs, rarely, Vec::new());
@@ -565,6 +570,18 @@ mod tests {
             assert!(matches!(judged, Judgement::NotCovered { .. }), "{judged}");
             assert!(judged.to_string().contains(word), "{judged}");
         }
+        // Windows in which news are a little too old, where all else would do.
+        let stale = Seen { exchange: Some(Exchange { age: s(0.63), ..EVERY_TENTH }), ..seen };
+        let stale = watch(&agreement(0.1), &graphs, stale, Vec::new());
+        assert_eq!((stale.covered_by, stale.too_rare().len()), (None, 1), "{:?}", stale.margins);
+        assert!(stale.too_rare()[0].contains("age of news [s]"));
+        // What messages have nothing to do with is none of these conditions; nor is what holds.
+        let strong = Watched::Agreement(vec![0.1; 3], PathFollowing::TypeI { lambda_1: 1.0, rho_1: 5.0, alpha_1: 0.5 });
+        let strong = watch(&strong, &graphs, Seen { exchange: Some(EVERY_TENTH), ..seen }, Vec::new());
+        assert!(strong.too_rare().is_empty() && !strong.failing().is_empty());
+        // A law without gains is not asked how far it moves.
+        let delayed = watch(&Watched::Delayed, &graphs, Seen { exchange: Some(EVERY_TENTH), ..seen }, Vec::new());
+        assert!(delayed.margins.iter().all(|margin| !margin.quantity.contains("eigenvalue")), "{:?}", delayed.margins);
         // Gains that move a fleet far between two messages.
         let seen = Seen { exchange: Some(EVERY_TENTH), ..seen };
         assert!(watch(&agreement(1.6), &graphs, seen, Vec::new()).covered_by.is_some());
@@ -591,6 +608,8 @@ mod tests {
     fn one_way_links_and_broken_premises_cover_nothing() {
         let (_, seen) = row_of_three(2.5, 100.0);
         let cycle = [Graph::from_arcs(3, &[(0, 1), (1, 2), (2, 0)])];
+        let at_times = [Graph::complete(3), cycle[0].clone()];
+        assert_eq!(watch(&agreement(0.1), &at_times, seen, Vec::new()).covered_by, None);
         for watched in [agreement(0.1), Watched::Dynamic(1.0, 1.6), Watched::Delayed] {
             let judged = watch(&watched, &cycle, seen, Vec::new()).judge(&[], Tolerance::default());
             assert!(judged.to_string().starts_with("not covered: it takes two-way links"), "{judged}");
@@ -614,5 +633,93 @@ mod tests {
         let statements: Vec<_> = strong.failing().into_iter().map(|margin| margin.statement).collect();
         assert_eq!(statements, ["Theorem 4.4 (type I)", "Theorem 4.4 (type I)", "Theorem 4.5 (type I)"]);
         assert_eq!(strong.covered_by, None);
+    }
+
+    #[test]
+    fn the_margins_of_type_i_are_those_of_the_theorem() {
+        let (graphs, seen) = row_of_three(2.5, 100.0);
+        let following = PathFollowing::TypeI { lambda_1: 2.0, rho_1: 1e-9, alpha_1: 0.25 };
+        let watched = Watched::Agreement(vec![0.5; 3], following);
+        let weak = watch(&watched, &graphs, seen, Vec::new());
+        // ρ_1/(α_1λ_1) is weak enough, but three quarters of the time are more than the half that type I can bear.
+        assert!((weak.margins[0].value - 2e-9).abs() < 1e-18 && weak.margins[0].holds());
+        assert!(!weak.margins[1].holds() && weak.margins[1].limit <= 0.5, "{:?}", weak.margins);
+        assert_ne!(weak.covered_by, Some("Theorem 4.4 (type I)"));
+        let limit =
+            |quantity: &str| weak.margins.iter().find(|margin| margin.quantity == quantity).map(|margin| margin.limit);
+        assert_eq!((limit("loop gain"), limit("T [s]")), (Some(1.0), Some(100.0)));
+        let type_ii = watch(&agreement(0.5), &graphs, seen, Vec::new());
+        assert_eq!((type_ii.margins[0].value, type_ii.margins[0].limit), (0.75, 1.0));
+    }
+
+    #[test]
+    fn envelope_and_allowance_by_hand() {
+        let envelope = Envelope { statement: "a statement", factor: 3.0, rate: 0.4 };
+        assert!((envelope.at(5.0) - 3.0 * (-2.0f64).exp()).abs() < 1e-12 && envelope.at(0.0) == 3.0);
+        // Nothing decays for two seconds, then at three quarters of the rate, and 0.1 stays.
+        let tolerance = Tolerance { late: 2.0, slower: 0.25, added: 0.1 };
+        let close = |t: f64, by_hand: f64| (tolerance.allowed(&envelope, 5.0, t) - by_hand).abs() < 1e-7;
+        assert!(close(0.0, 15.1) && close(2.0, 15.1) && close(7.0, 15.0 * (-1.5f64).exp() + 0.1));
+        // Rounding is allowed for, in proportion.
+        assert!(Tolerance::default().allowed(&envelope, 5.0, 0.0) > 15.0);
+    }
+
+    #[test]
+    fn how_fast_news_pass_by_hand() {
+        // Twice the most neighbours, but no more than n; the star has 2, the complete graph of 5 has 4.
+        let star = [Graph::from_edges(5, &[(0, 1), (0, 2)])];
+        let all = [star[0].clone(), Graph::complete(5)];
+        let agreement = Watched::Agreement(vec![0.1, 0.3, 0.2, 0.1, 0.1], PathFollowing::TypeII { lambda_1: 1.0 });
+        assert!(
+            (agreement.speed(&star) - 0.3 * 4.0).abs() < 1e-12 && (agreement.speed(&all) - 0.3 * 5.0).abs() < 1e-12
+        );
+        let dynamic = Watched::Dynamic(2.0, 3.0);
+        assert!((dynamic.speed(&star) - 4.0 * (0.5 + 0.2)).abs() < 1e-12);
+        assert_eq!(Watched::Delayed.speed(&all), 0.0);
+    }
+
+    #[test]
+    fn the_tolerance_by_hand() {
+        let (_, seen) = row_of_three(2.5, 100.0);
+        let seen = Seen { exchange: Some(EVERY_TENTH), ..seen };
+        let of = |graphs: &[Graph], seen: Seen, drift: f64| {
+            watch(&agreement(0.1), graphs, seen, Vec::new()).tolerance(&agreement(0.1), graphs, drift)
+        };
+        // Behind by 0.1 each; two neighbours and λ_2 = 3 in a triangle, whichever way the fleet goes.
+        let triangle = [Graph::complete(3)];
+        for drift in [0.5, -0.5] {
+            assert!((of(&triangle, seen, drift).added - 0.1 * 3f64.sqrt() * 2.0 / 3.0).abs() < 1e-12);
+        }
+        // Of several connected ones the least counts: a row has λ_2 = 1.
+        let mixed = [Graph::complete(3), Graph::from_edges(3, &[(0, 1), (1, 2)])];
+        assert!((of(&mixed, seen, 0.5).added - 0.1 * 3f64.sqrt() * 2.0).abs() < 1e-12);
+        // Never connected at once: that of the union, a row, with one neighbour at a time; and of what never connects nothing.
+        let by_turns = [Graph::from_edges(3, &[(0, 1)]), Graph::from_edges(3, &[(1, 2)])];
+        assert!((of(&by_turns, seen, 0.5).added - 0.1 * 3f64.sqrt()).abs() < 1e-12);
+        assert_eq!(of(&by_turns[..1], seen, 0.5).added, 0.0);
+        // News so old that nothing is left of the rate.
+        let old = Seen { exchange: Some(Exchange { age: s(10.0), ..EVERY_TENTH }), ..seen };
+        assert_eq!(of(&triangle, old, 0.5).slower, 1.0);
+    }
+
+    #[test]
+    fn errors_are_judged_from_their_own_beginning() {
+        let (graphs, seen) = row_of_three(2.5, 100.0);
+        let watch = watch(&agreement(0.1), &graphs, seen, Vec::new());
+        let envelope = watch.envelope.expect("a rate");
+        // Half of what is allowed five seconds after the first of them, which was seen at 40 s.
+        let half = 0.5 * envelope.at(5.0);
+        let judged = watch.judge(&[(40.0, 1.0), (45.0, half)], Tolerance::default());
+        assert!(matches!(judged, Judgement::Covered { closest: Some(part), .. } if part < 1.0), "{judged:?}");
+        let more = watch.judge(&[(40.0, 1.0), (45.0, 1.001 * envelope.at(5.0))], Tolerance::default());
+        assert!(matches!(more, Judgement::Defect { at: 45.0, .. }), "{more:?}");
+        let part = |errors: &[(f64, f64)]| match watch.judge(errors, Tolerance::default()) {
+            Judgement::Covered { closest, .. } => closest,
+            other => panic!("{other:?}"),
+        };
+        assert!(
+            part(&[(0.0, 1.0), (5.0, half)]).is_some_and(|part| (part - (1.0 / envelope.factor).max(0.5)).abs() < 1e-6)
+        );
+        assert_eq!(part(&[(0.0, 0.0), (5.0, 0.0)]), Some(0.0), "who agrees from the start");
     }
 }

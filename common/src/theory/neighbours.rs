@@ -48,6 +48,7 @@ mod tests {
         assert_eq!(rate(&Graph::from_edges(3, &[(0, 1)]), 0, gains, 5.0), None);
         assert_eq!(rate(&Graph::from_arcs(2, &[(0, 1)]), 0, gains, 5.0), None);
         assert_eq!(rate(&Graph::complete(2), 2, gains, 5.0), None);
+        assert!(rate(&Graph::complete(2), 1, gains, 5.0).is_some());
     }
 
     proptest! {

@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(add(&[1.0, 0.0, 0.0], &[2.0, 3.0]), [1.0, 2.0, 3.0]);
         assert_eq!(shifted_power(2.0, 3), [1.0, 6.0, 12.0, 8.0]);
         assert_eq!(product(&[&[2.0], &[1.0, 1.0], &[1.0, -1.0]]), [2.0, 0.0, -2.0]);
-        assert!(multiply(&[], &[1.0]).is_empty());
+        assert!(multiply(&[], &[1.0]).is_empty() && multiply(&[1.0, 2.0], &[]).is_empty());
     }
 
     #[test]
@@ -130,6 +130,7 @@ mod tests {
         assert!(!is_hurwitz(&[1.0, 1.0, 1.0, 1.0]) && !is_hurwitz(&[1.0, 1.0, 1.0, 2.0]));
         assert!(!is_hurwitz(&[1.0, -1.0]) && !is_hurwitz(&[]) && !is_hurwitz(&[0.0, 1.0]) && is_hurwitz(&[4.0]));
         assert!(!is_hurwitz(&[1.0, f64::INFINITY]) && !is_hurwitz(&[1.0, 0.0]));
+        assert!(!is_hurwitz(&[0.0]) && !is_hurwitz(&[f64::INFINITY]) && !is_hurwitz(&[f64::NAN]));
     }
 
     #[test]
@@ -142,6 +143,10 @@ mod tests {
         assert!(close(slowest(&[1.0, 3.0, 2.0]), 1.0, 1));
         assert!(close(slowest(&[1.0, 1.0, 1.0]), 0.5, 1), "a pair of complex roots is two different ones");
         assert_eq!(slowest(&[0.0, 1.0]), None);
+        // (λ² + 0.2λ + 1)(λ + 3): a pair that turns is slower than a root that does not.
+        assert!(close(slowest(&multiply(&[1.0, 0.2, 1.0], &[1.0, 3.0])), 0.1, 1));
+        // Four digits of each, however slow: 0.001 and 0.00105 are two.
+        assert!(close(slowest(&[1.0, 2.05e-3, 1.05e-6]), 1e-3, 1));
     }
 
     proptest! {

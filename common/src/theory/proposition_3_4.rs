@@ -115,9 +115,24 @@ mod tests {
         // c = 1, a = 1, λ = 2: [2 −√2; −√2 2], least eigenvalue 2 − √2: the exact rate is the same here.
         let rate = rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &Graph::complete(2), 1.0).expect("connected");
         assert!((rate - (2.0 - 2f64.sqrt())).abs() < 1e-12, "{rate}");
+        // Three, all two-way, λ = 3: [3 −√3; −√3 2].
+        let rate = rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &Graph::complete(3), 1.0).expect("connected");
+        assert!((rate - (5.0 - 13f64.sqrt()) / 2.0).abs() < 1e-12, "{rate}");
         let one_way = Graph::from_arcs(2, &[(0, 1)]);
         assert_eq!(rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &one_way, 1.0), None);
         assert_eq!(rate_for_varying_paths(Law::SolutionTwo { a: 1.0, b: 1.0 }, &Graph::complete(2), 1.0), None);
+        assert_eq!(rate_for_varying_paths(Law::SolutionOne { a: 1.0 }, &Graph::empty(2), 1.0), None, "apart");
+        for (a, b, c_1) in [
+            (0.0, 1.0, 1.0),
+            (-1.0, 1.0, 1.0),
+            (1.0, 0.0, 1.0),
+            (1.0, -1.0, 1.0),
+            (1.0, 1.0, 0.0),
+            (1.0, 1.0, f64::INFINITY),
+        ] {
+            let law = Law::SolutionThree { a, b };
+            assert_eq!(rate_for_varying_paths(law, &Graph::complete(2), c_1), None, "{a} {b} {c_1}");
+        }
     }
 
     #[test]
@@ -130,7 +145,10 @@ mod tests {
         assert!(!losing.holds && losing.norm_rate.is_none() && losing.value.contains("loses"));
         let apart = verdict(law, &Graph::empty(2), &constant, true);
         assert!(!apart.holds && apart.value.contains("not connected"));
-        assert!(verdict(law, &Graph::complete(2), &PathRates::AtMost(4.0), true).norm_rate.is_some());
+        let varying = verdict(law, &Graph::complete(2), &PathRates::AtMost(4.0), true).norm_rate;
+        assert_eq!(varying, rate_for_varying_paths(law, &Graph::complete(2), 0.25), "c_1 = 1/R");
+        let one_way = verdict(law, &Graph::from_arcs(2, &[(0, 1)]), &constant, true);
+        assert!(!one_way.holds && one_way.norm_rate.is_none() && one_way.value.contains("one-way"));
         let jumping = verdict(law, &Graph::complete(2), &PathRates::Jumping, true);
         assert!(jumping.holds && jumping.norm_rate.is_none() && jumping.value.contains("erratum 3.18"));
         assert!(good.condition.contains("d = 0"));

@@ -287,4 +287,45 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn gains_that_are_not_positive_promise_nothing() {
+        // a²/b does not tell a from −a, and b = 0 makes it infinite.
+        for (a, b) in [(-2.0, 1.0), (2.0, 0.0), (2.0, -1.0), (0.0, 1.0)] {
+            let answer = DirectedLaw::OverC.verdict(&cycle(), false, a, b, true);
+            assert_eq!((answer.holds, answer.norm_rate), (false, None), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_roots_of_one_mode_in_closed_form() {
+        // λ² + aμλ + bμ at μ = 8: 4 ∓ √8, slower than nothing else, for the leader's loop has no mean of η that decays at a.
+        let rate = DirectedLaw::Leader.rate(1.0, 1.0, &[Complex::from(8.0)]);
+        assert!((rate - (4.0 - 8f64.sqrt())).abs() < 1e-12, "{rate}");
+        // Who is alone has a mean of η only: it decays at a, unless the vehicle leads.
+        assert_eq!(
+            (DirectedLaw::OverC.rate(2.0, 1.0, &[]), DirectedLaw::Leader.rate(2.0, 1.0, &[])),
+            (2.0, f64::INFINITY)
+        );
+        // Roots far apart: the small one, b/a, to all its digits.
+        for a in [1e6, -1e6] {
+            let [large, small] = DirectedLaw::OverC.roots(a, 1.0, Complex::from(1.0));
+            assert!(
+                (large.re / -a - 1.0).abs() < 1e-9 && (small.re * -a - 1.0 - 1e-12).abs() < 1e-15,
+                "{large} {small}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_border_is_drawn_as_far_as_is_asked() {
+        let border = DirectedLaw::OverC.border(2.0, 3.0, 10);
+        assert_eq!((border.len(), border[0]), (11, (0.0, 0.0)));
+        assert!((border[10].0 - 3.0).abs() < 1e-12 && (border[10].1 - 6f64.sqrt()).abs() < 1e-12);
+        // Im²μ = 2 Re μ is steep at zero: its points go up in equal steps.
+        assert!(border.windows(2).all(|pair| (pair[1].1 - pair[0].1 - 0.1 * 6f64.sqrt()).abs() < 1e-12));
+        let furthest = |(re, im): &(f64, f64)| re.hypot(*im);
+        let leader = DirectedLaw::Leader.border(1.0, 3.0, 400);
+        assert!(leader.last().is_some_and(|last| (2.9..=3.0).contains(&furthest(last))), "{:?}", leader.last());
+    }
 }

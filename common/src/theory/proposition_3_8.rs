@@ -101,4 +101,37 @@ mod tests {
             prop_assert!(least_eigenvalue(&graph, &a, r).expect("sizes fit") > 0.0);
         }
     }
+
+    #[test]
+    fn unlike_gains_and_radii_by_hand() {
+        let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        // ½(3 − ½)·2: R differ by 3, gains by 2, and the centre has two neighbours.
+        assert!((threshold(&star, &[1.0, 2.0, 1.0], &[0.2, 0.6, 0.3]) - 2.5).abs() < 1e-12);
+        // A pair with a = (1, 2), R = (1, 3): Q = [4 −2.5; −2.5 15].
+        let least = least_eigenvalue(&Graph::complete(2), &[1.0, 2.0], &[1.0, 3.0]).expect("sizes fit");
+        assert!((least - (19.0 - 146f64.sqrt()) / 2.0).abs() < 1e-9, "{least}");
+        assert_eq!(least_eigenvalue(&star, &[1.0; 3], &[1.0; 2]), None);
+        // The star with R = (2, 1, 1): [12 −3 −3; −3 4 0; −3 0 4], with 4 and 8 ∓ √34.
+        let least = least_eigenvalue(&star, &[1.0; 3], &[2.0, 1.0, 1.0]).expect("sizes fit");
+        assert!((least - (8.0 - 34f64.sqrt())).abs() < 1e-9, "{least}");
+    }
+
+    #[test]
+    fn either_condition_will_do_on_a_two_way_connected_network_only() {
+        let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
+        let at = |graph: &Graph, r: [f64; 3]| verdict(graph, &[0.5; 3], &[r.to_vec()]);
+        // (3.97) with a_1² = 0.25: 0.2 is enough, 0.4 is not, but Q is still positive there.
+        let meets = at(&star, [1.2, 1.0, 1.0]);
+        assert!(meets.holds && meets.value.starts_with("a₁² = 0.2500,") && !meets.value.contains("not enough"));
+        let fails = at(&star, [1.12, 0.8, 0.8]);
+        assert!(fails.holds && fails.value.starts_with("a₁² = 0.2500, not enough"), "{fails:?}");
+        let least = least_eigenvalue(&star, &[0.5; 3], &[1.12, 0.8, 0.8]).expect("sizes fit");
+        assert!((0.5..1.0).contains(&least), "{least}");
+        // The same numbers, but somebody hears nobody, or is not heard.
+        for graph in [Graph::from_arcs(3, &[(0, 1), (1, 2), (2, 0)]), Graph::from_edges(3, &[(0, 1)])] {
+            assert!(threshold(&graph, &[0.5; 3], &[1.0; 3]) <= 0.0 && !at(&graph, [1.0; 3]).holds);
+        }
+        // One place where Q is not positive is enough to fail.
+        assert!(!verdict(&star, &[0.2; 3], &[vec![1.0; 3], vec![20.0, 1.0, 1.0]]).holds);
+    }
 }

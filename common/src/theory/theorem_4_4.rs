@@ -214,6 +214,7 @@ mod tests {
     use crate::graph::spectrum::tests::{a_fleet, all_graphs};
     use crate::graph::switching::Switching;
     use crate::random::Stream;
+    use crate::theory::Gains;
     use crate::theory::PathFollowing::{TypeI, TypeII};
     use crate::time::{Span, Time};
     use nalgebra::{DMatrix, DVector};
@@ -353,5 +354,67 @@ mod tests {
                 prop_assert!(v(&z) <= promised * (1.0 + 1e-9) + 1e-12, "{} {} at {}", v(&z), promised, t);
             }
         }
+    }
+
+    #[test]
+    fn lemma_4_3_in_closed_form() {
+        // λ_0 = 2 − √(1 + 0.75), whichever of the two drives more.
+        let lambda_0 = 2.0 - 1.75f64.sqrt();
+        for (drive_1, drive_2) in [(1.5, 0.5), (0.75, 1.0)] {
+            let two = Interconnection { lambda_1: 3.0, lambda_2: 1.0, growth_2: 0.5, drive_1, drive_2 };
+            assert!((two.lambda_0() - lambda_0).abs() < 1e-12);
+            assert!((two.rate(0.2) - (lambda_0 - 0.3)).abs() < 1e-12);
+            // (1, w) is a left eigenvector of [−λ_1 r_1; r_2 −λ_2].
+            let w = two.weight().expect("they drive each other");
+            assert!(
+                w > 0.0 && (-3.0 + w * drive_2 + lambda_0).abs() < 1e-12 && (drive_1 - w + lambda_0 * w).abs() < 1e-12
+            );
+            // α < λ_0/(λ_2 + λ~_2) = 0.4514, and no part of the time is less than none.
+            assert!(
+                two.holds(0.0) && two.holds(0.451) && !two.holds(0.452) && !two.holds(-0.1) && !two.holds(f64::NAN)
+            );
+            assert!((two.overshoot(0.25, Span::from_secs(2.0)) - 2.25f64.exp()).abs() < 1e-9);
+        }
+        // (4.19): λ_1λ_2 = 6 bears a product of drives below it, not above.
+        let driven = |drive_1| Interconnection { lambda_1: 3.0, lambda_2: 2.0, growth_2: 0.5, drive_1, drive_2: 1.0 };
+        assert!(driven(5.99).holds(0.0) && !driven(6.01).holds(0.0));
+        // A cascade goes at the rate of the slower of the two.
+        let cascade = |lambda_1| Interconnection { lambda_1, lambda_2: 2.0, growth_2: 0.5, drive_1: 9.0, drive_2: 0.0 };
+        assert!((cascade(3.0).rate(0.2) - 1.5).abs() < 1e-12 && (cascade(0.5).rate(0.2) - 0.5).abs() < 1e-12);
+    }
+
+    /// Gains between ½ and 2, λ_m = 3, λ_2(K^½LK^½) = 4.
+    fn unlike_gains(alpha: f64) -> Coordination {
+        Coordination { gains: Gains { n: 3, k_m: 0.5, k_max: 2.0 }, lambda_m: 3.0, lambda_2_weighted: 4.0, alpha }
+    }
+
+    #[test]
+    fn with_unlike_gains_it_is_still_lemma_4_3() {
+        let fleet = unlike_gains(0.1);
+        // 3²·½³/(3²·2³).
+        assert!((fleet.k_g() - 1.0 / 64.0).abs() < 1e-15);
+        for (lambda_1, alpha_1, part) in [(0.7, 0.4, 0.0), (0.7, 0.4, 0.3), (2.5, 3.0, 0.6), (0.7, 3.0, 1.2)] {
+            let rho_1 = part * fleet.k_g() * alpha_1 * lambda_1;
+            let (lemma, following) =
+                (Interconnection::of_type_1(&fleet, lambda_1, rho_1, alpha_1), TypeI { lambda_1, rho_1, alpha_1 });
+            assert!((lemma.lambda_0() - fleet.lambda_0(lambda_1, rho_1, alpha_1)).abs() < 1e-12);
+            assert!((fleet.alpha_limit(following) - (lemma.lambda_0() / 3.0).max(0.0)).abs() < 1e-12, "2k_mλ_m = 3");
+            assert_eq!((fleet.holds(following), lemma.holds(0.1)), (part < 1.0, part < 1.0), "{part}");
+            assert!(close(fleet.rate_of_v(following), lemma.rate(0.1)) || part > 1.0);
+            // Each of the two drives, (4.25) and (4.29).
+            assert!((lemma.drive_1 - rho_1 * 36.0 * 4.0).abs() < 1e-12);
+            assert!((lemma.drive_2 - 1.0 / (4.0 * 0.5 * 0.75) / alpha_1).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn agreement_with_unlike_gains_in_closed_form() {
+        let fleet = unlike_gains(0.25);
+        assert!((fleet.rate_of_agreement() - 1.125).abs() < 1e-12);
+        assert!((fleet.sharper_rate_of_agreement() - 3.0).abs() < 1e-12);
+        // √(k_M/k_m) = 2.
+        assert!((fleet.overshoot(Span::from_secs(2.0)) - 2.0 * 2.25f64.exp()).abs() < 1e-9);
+        let type_ii = TypeII { lambda_1: 9.0 };
+        assert!(fleet.holds(type_ii) && !unlike_gains(-0.25).holds(type_ii), "no part of the time is less than none");
     }
 }

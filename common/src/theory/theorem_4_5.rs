@@ -123,7 +123,7 @@ pub fn verdict(gains: Gains, mean: Option<Span>, dwell: Span, two_way: bool, fol
 
 #[cfg(test)]
 mod tests {
-    use super::{agreement, loop_gain, verdict};
+    use super::{Agreement, agreement, loop_gain, verdict};
     use crate::graph::Graph;
     use crate::graph::measure::Connectivity;
     use crate::graph::spectrum::l_beta;
@@ -182,7 +182,7 @@ mod tests {
         assert!(good.holds && good.norm_rate.is_some_and(|rate| rate > 0.0));
         let one_way = verdict(fleet, Some(s(10.0)), s(10.0), false, type_ii);
         assert_eq!((one_way.holds, one_way.norm_rate), (false, None));
-        assert!(one_way.value.ends_with("one-way links"));
+        assert!(one_way.value.ends_with("one-way links") && !good.value.contains("one-way"));
         let never = verdict(fleet, None, s(10.0), true, type_ii);
         assert_eq!((never.holds, never.norm_rate), (false, None));
         let slow_following = verdict(fleet, Some(s(10.0)), s(10.0), true, TypeII { lambda_1: 1e-4 });
@@ -253,5 +253,45 @@ mod tests {
             let claimed = (-2.0 * proven.rate * (mean + 2.0 * dwell)).exp();
             prop_assert!(contraction <= claimed + 1e-12, "{} {}", contraction, claimed);
         }
+    }
+
+    #[test]
+    fn the_proof_by_hand_for_four_unlike_gains() {
+        // T = 0.7 s, τ = 0.1 s: N = 8, H = 4, M = 3, and the three nearest of four pieces are 3, 2 and 1 pieces away.
+        let proven = agreement(gains(&[0.5, 1.0, 2.0, 1.0]), s(0.7), s(0.1)).expect("it dwells");
+        let (sigma, apart, lambda) = (8.0f64, 3.0 + 2.0 + 1.0, 2.0 - 2f64.sqrt());
+        let (g, h) = (sigma / (1.0 - (-1.6f64).exp()), 0.8f64.tanh());
+        let q = 0.5 * lambda / (g.sqrt() + (sigma * h * apart).sqrt()).powi(2);
+        assert!((proven.rate - 0.5 * (1.0 + q).ln() / 0.9).abs() < 1e-12, "{}", proven.rate);
+        assert!(
+            (proven.overshoot - ((1.0 + q).powf(11.0 / 9.0) * 2.0 / 0.5).sqrt()).abs() < 1e-12,
+            "{}",
+            proven.overshoot
+        );
+        // A tree of three has two edges, so that only the pieces 3 and 2 away count, and λ = 1.
+        let three = agreement(gains(&[0.5, 1.0, 2.0]), s(0.7), s(0.1)).expect("it dwells");
+        let (g, h) = (6.0 / (1.0 - (-1.2f64).exp()), 0.6f64.tanh());
+        let q_3 = 0.5 / (g.sqrt() + (6.0 * h * 5.0).sqrt()).powi(2);
+        assert!((three.rate - 0.5 * (1.0 + q_3).ln() / 0.9).abs() < 1e-12, "{}", three.rate);
+        assert_eq!(agreement(Gains { n: 1, k_m: 1.0, k_max: 1.0 }, s(0.7), s(0.1)), None, "nobody to agree with");
+        // An odd number of pieces has its middle in one of them: N = 7, H = 4 as well.
+        let odd = agreement(gains(&[0.5, 1.0, 2.0, 1.0]), s(0.6), s(0.1)).expect("it dwells");
+        assert!((odd.rate - 0.5 * (1.0 + q).ln() / 0.8).abs() < 1e-12, "{}", odd.rate);
+    }
+
+    #[test]
+    fn the_loop_gain_by_hand() {
+        // √(18/(½·4)) = 3, times n k_M = 8, times C/r = 12.
+        let gain = loop_gain(gains(&[1.0, 2.0, 1.0, 0.5]), Agreement { rate: 0.25, overshoot: 3.0 }, 0.5, 18.0, 4.0);
+        assert!((gain - 288.0).abs() < 1e-9, "{gain}");
+        let type_i = TypeI { lambda_1: 1.0, rho_1: 0.0, alpha_1: 0.5 };
+        let fleet = gains(&[1.0; 3]);
+        assert!(verdict(fleet, Some(s(10.0)), s(10.0), true, type_i).holds);
+        assert!(
+            !verdict(fleet, None, s(10.0), true, type_i).holds
+                && !verdict(fleet, Some(s(10.0)), s(10.0), false, type_i).holds
+        );
+        // Path following that does not decay leaves no rate to promise.
+        assert_eq!(verdict(fleet, Some(s(10.0)), s(10.0), true, TypeII { lambda_1: 0.0 }).norm_rate, None);
     }
 }

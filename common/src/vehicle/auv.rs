@@ -276,6 +276,8 @@ mod tests {
         let auv = frictionless();
         let start = moving(0.2, -0.7);
         let end = run(&auv, start, &AuvInput::default(), 0.005, 4000);
+        // ½(4.7·0.36 + 7.6·0.09 + 6.4·0.04) + ½(2.2·0.09 + 7.5·0.16 + 7.7·0.25).
+        assert!((auv.kinetic_energy(&start) - 0.5 * (2.632 + 3.323)).abs() < 1e-12);
         let momentum = |s: &AuvState| s.attitude * auv.parameters().mass.component_mul(&s.velocity);
         let energy = auv.kinetic_energy(&start);
         assert!((auv.kinetic_energy(&end) / energy - 1.0).abs() < 1e-9);
@@ -323,6 +325,46 @@ mod tests {
     }
 
     #[test]
+    fn torques_by_hand() {
+        // One at a time: drag; buoyancy at an arm, r_B × B e_z; S(v)Mv, which turns a hull that drifts sideways (Munk); S(ω)Jω.
+        let (auv, none, up) = (sirene(), Vector3::zeros(), Vector3::z());
+        let drag = auv.torque(&none, &Vector3::new(0.0, -0.5, 0.0), &none);
+        assert!((drag - Vector3::new(0.0, 0.8 * 0.5 + 7.2 * 0.25, 0.0)).norm() < 1e-12, "{drag}");
+        let arm = AuvParameters { centre_of_buoyancy: Vector3::new(0.1, 0.2, -0.3), weight: 41.0, ..*auv.parameters() };
+        let righting = Auv::new(arm).expect("valid").torque(&none, &none, &up);
+        assert!((righting - Vector3::new(-0.2 * 39.24, 0.1 * 39.24, 0.0)).norm() < 1e-12, "{righting}");
+        let munk = auv.torque(&Vector3::new(0.5, 0.2, 0.0), &none, &none);
+        assert!((munk - Vector3::new(0.0, 0.0, -0.5 * 0.2 * (7.6 - 4.7))).norm() < 1e-12, "{munk}");
+        let gyroscopic = frictionless().torque(&none, &Vector3::new(0.3, 0.4, 0.0), &none);
+        assert!((gyroscopic - Vector3::new(0.0, 0.0, -0.3 * 0.4 * (7.5 - 2.2))).norm() < 1e-12, "{gyroscopic}");
+    }
+
+    #[test]
+    fn one_number_that_is_none_is_told_of() {
+        let sound = moving(0.1, 0.2);
+        assert!(sound.is_finite());
+        let nan = Vector3::new(0.0, f64::NAN, 0.0);
+        let lost = UnitQuaternion::new_unchecked(Quaternion::new(1.0, f64::NAN, 0.0, 0.0));
+        for state in [
+            AuvState { position: nan, ..sound },
+            AuvState { attitude: lost, ..sound },
+            AuvState { velocity: nan, ..sound },
+            AuvState { spin: nan, ..sound },
+        ] {
+            assert!(!state.is_finite(), "{state:?}");
+        }
+        let input = AuvInput { thrust: 1.0, pitch_torque: 2.0, yaw_torque: 3.0 };
+        assert!(input.is_finite());
+        for input in [
+            AuvInput { thrust: f64::NAN, ..input },
+            AuvInput { pitch_torque: f64::INFINITY, ..input },
+            AuvInput { yaw_torque: f64::NAN, ..input },
+        ] {
+            assert!(!input.is_finite(), "{input:?}");
+        }
+    }
+
+    #[test]
     fn excess_weight_sinks_along_minus_z() {
         let heavy = Auv::new(AuvParameters { weight: 39.44, ..*sirene().parameters() }).expect("valid");
         let start = AuvState::at_rest(Vector3::zeros(), UnitQuaternion::identity());
@@ -348,6 +390,8 @@ mod tests {
         let auv = Auv::new(weak).expect("valid");
         let given = auv.saturate(&AuvInput { thrust: 0.4, pitch_torque: -3.0, yaw_torque: 0.3 });
         assert_eq!(given, AuvInput { thrust: 0.4, pitch_torque: -0.2, yaw_torque: 0.2 });
+        let given = auv.saturate(&AuvInput { thrust: -0.6, pitch_torque: 0.1, yaw_torque: -0.3 });
+        assert_eq!(given, AuvInput { thrust: -0.5, pitch_torque: 0.1, yaw_torque: -0.2 });
     }
 
     #[test]
@@ -359,7 +403,22 @@ mod tests {
             AuvParameters { quadratic_drag: Vector3::new(-1.0, 0.0, 0.0), ..good },
             AuvParameters { weight: f64::INFINITY, ..good },
             AuvParameters { torque_limit: f64::NAN, ..good },
+            AuvParameters { torque_limit: 0.0, ..good },
+            AuvParameters { thrust_limit: 0.0, ..good },
+            AuvParameters { thrust_limit: -1.0, ..good },
+            AuvParameters { mass: Vector3::new(1.0, f64::INFINITY, 1.0), ..good },
+            AuvParameters { linear_drag: Vector3::new(0.0, 0.0, f64::INFINITY), ..good },
+            AuvParameters { buoyancy: f64::NAN, ..good },
+            AuvParameters { centre_of_buoyancy: Vector3::new(0.0, f64::NAN, 0.0), ..good },
         ];
+        // Without limits, and of less than one tonne.
+        let light = AuvParameters {
+            mass: Vector3::repeat(0.5),
+            thrust_limit: f64::INFINITY,
+            torque_limit: f64::INFINITY,
+            ..good
+        };
+        assert!(Auv::new(light).is_ok());
         for parameters in bad {
             assert!(Auv::new(parameters).is_err());
         }

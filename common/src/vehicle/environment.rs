@@ -222,6 +222,12 @@ mod tests {
         assert_eq!(at(0.0), Vector3::new(0.1, 0.0, 0.0));
         assert!((at(10.0) - Vector3::new(0.1, 0.2, 0.0)).norm() < 1e-15);
         assert!((at(30.0) - Vector3::new(0.1, -0.2, 0.0)).norm() < 1e-15);
+        // φ = 30° at the start, a quarter turn 40/3 s later.
+        let early = Current { tide: Some(Tide { phase: TAU / 12.0, ..tide }), ..current };
+        assert!(
+            (early.at(Time::ZERO).y - 0.1).abs() < 1e-15
+                && (early.at(Time::from_secs(40.0 / 6.0)).y - 0.2).abs() < 1e-9
+        );
         let mut environment = environment(Disturbances { current: Some(current), ..Disturbances::default() });
         let drift = environment.conditions(Time::from_secs(10.0), 100).drift(0.5).expect("flows");
         assert!((drift - Vector3::new(0.05, 0.1, 0.0)).norm() < 1e-15);
@@ -249,11 +255,21 @@ mod tests {
     }
 
     #[test]
+    fn no_number_is_used_twice() {
+        let disturbances = Disturbances { noise: Some(LEVELS), ..Disturbances::default() };
+        let mut one = environment(disturbances);
+        let mut all: Vec<f64> = (0..200).flat_map(|index| numbers(&mut one, index)).map(f64::abs).collect();
+        all.sort_by(f64::total_cmp);
+        assert!(all.windows(2).all(|pair| pair[1] - pair[0] > 1e-12 * pair[1]), "a place of the stream is read twice");
+    }
+
+    #[test]
     fn a_quiet_instrument_leaves_the_numbers_of_the_others_alone() {
         let with = |levels| environment(Disturbances { noise: Some(levels), ..Disturbances::default() });
         let of = |levels| with(levels).conditions(Time::ZERO, 3).errors.expect("noise");
         let quiet = of(NoiseLevels { position: 0.0, ..LEVELS });
         assert_eq!(quiet, InstrumentErrors { position: Vector3::zeros(), ..of(LEVELS) });
+        assert_eq!(of(NoiseLevels { heading: 0.0, ..LEVELS }), InstrumentErrors { heading: 0.0, ..of(LEVELS) });
     }
 
     #[test]

@@ -59,9 +59,19 @@ mod tests {
     }
 
     #[test]
+    fn time_goes_on_from_one_substep_to_the_next() {
+        // ∫₀² t³ dt = 4, in any number of steps.
+        let model = |t: f64, _: &Vector1<f64>, _: &(), _: &()| Vector1::new(t.powi(3));
+        for substeps in [1, 2, 5] {
+            assert!((advance(model, &Vector1::new(0.0), &(), &(), 2.0, substeps).x - 4.0).abs() < 1e-12, "{substeps}");
+        }
+    }
+
+    #[test]
     fn no_substeps_count_as_one() {
         let model = |_: f64, x: &Vector1<f64>, _: &(), _: &()| -x;
         let x = Vector1::new(1.0);
         assert_eq!(advance(model, &x, &(), &(), 0.1, 0), advance(model, &x, &(), &(), 0.1, 1));
+        assert_eq!(advance(model, &x, &(), &(), 0.1, 1), rk4_step(model, 0.0, &x, &(), &(), 0.1));
     }
 }

@@ -254,8 +254,16 @@ mod tests {
 
     #[test]
     fn a_vehicle_without_mass_is_refused() {
-        assert!(Parameters { m_v: 0.0, ..PARAMETERS }.checked().is_err());
-        assert!(Parameters { d_r: -1.0, ..PARAMETERS }.checked().is_err());
+        for wrong in [
+            Parameters { m_u: 0.0, ..PARAMETERS },
+            Parameters { m_v: 0.0, ..PARAMETERS },
+            Parameters { m_r: -1.0, ..PARAMETERS },
+            Parameters { d_u: -1.0, ..PARAMETERS },
+            Parameters { d_v: -1.0, ..PARAMETERS },
+            Parameters { d_r: -1.0, ..PARAMETERS },
+        ] {
+            assert!(wrong.checked().is_err(), "{wrong:?}");
+        }
         assert!(PARAMETERS.checked().is_ok());
     }
 }

@@ -115,6 +115,45 @@ mod tests {
     }
 
     #[test]
+    fn it_begins_as_if_it_had_gone_on_for_ever() {
+        let (n, share) = (4000, 4.0 / 5.5);
+        let groups = (0..n).map(|link| (vec![link], Stream::new(3, &link.to_string()))).collect();
+        let mut markov = Markov::new(n, groups, Span::from_secs(4.0), Span::from_secs(1.5));
+        let up = (0..n).filter(|link| markov.is_up(*link, Time::ZERO)).count() as f64 / n as f64;
+        assert!((up - share).abs() < 5.0 * (share * (1.0 - share) / n as f64).sqrt(), "{up} for {share}");
+    }
+
+    #[test]
+    fn the_shortest_time_is_part_of_the_mean_and_no_mean_is_shorter() {
+        let [down, up] = durations(0.005, 0.003, 60.0);
+        for (times, mean) in [(down, 0.005 - 0.002), (up, 0.005)] {
+            let found = times.iter().sum::<f64>() / times.len() as f64;
+            // What is beyond the shortest millisecond is exponential.
+            assert!(
+                (found - mean).abs() < 5.0 * (mean - 0.001) / (times.len() as f64).sqrt() + 1e-6,
+                "{found} for {mean}"
+            );
+            assert!(times.iter().all(|time| *time >= 0.001 - 1e-9));
+        }
+        assert!(durations(0.0, 1e-4, 1.0).concat().iter().all(|time| (time - 0.001).abs() < 1e-6));
+    }
+
+    #[test]
+    fn the_next_change_is_the_first_of_any_walk() {
+        let groups = vec![(vec![0], Stream::new(3, "a")), (vec![1], Stream::new(3, "b"))];
+        let mut markov = Markov::new(2, groups, Span::from_secs(1.0), Span::from_secs(1.0));
+        let mut t = Time::ZERO;
+        for _ in 0..200 {
+            let state = |markov: &mut Markov, t| [markov.is_up(0, t), markov.is_up(1, t)];
+            let next = markov.clone().next_change_after(t).expect("it goes on for ever");
+            let before = state(&mut markov, t);
+            assert_eq!(state(&mut markov, next - Span::from_nanos(1)), before);
+            assert_ne!(state(&mut markov, next), before);
+            t = next;
+        }
+    }
+
+    #[test]
     fn groups_walk_on_their_own() {
         let groups = vec![(vec![0, 1], Stream::new(3, "a")), (vec![2], Stream::new(3, "b"))];
         let mut markov = Markov::new(4, groups, Span::from_secs(1.0), Span::from_secs(1.0));

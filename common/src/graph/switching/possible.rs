@@ -49,10 +49,10 @@ impl Switching {
             Signal::Markov(walks) => {
                 let walk_of = walks.walk_of_link();
                 let count = walk_of.iter().flatten().max().map_or(0, |last| last + 1);
-                // All up comes first, so that it is there however many are cut off.
+                // All up comes first, so that it is there however many are cut off; beyond 63 walks none is told apart.
                 let subsets = (0..1u64 << count.min(63)).rev();
                 let state = |subset: u64| {
-                    walk_of.iter().map(|walk| walk.is_some_and(|walk| walk < 63 && subset >> walk & 1 == 1)).collect()
+                    walk_of.iter().map(|walk| walk.is_some_and(|walk| walk >= 63 || subset >> walk & 1 == 1)).collect()
                 };
                 let found = Possible::of(subsets.map(state), most);
                 Possible { complete: found.complete && count < 63, ..found }
@@ -142,6 +142,27 @@ mod tests {
         let many = Switching::markov(10, walks, s(1.0), s(1.0)).possible(100);
         assert_eq!((many.states.len(), many.complete), (100, false));
         assert!(many.states[0].iter().all(|up| *up), "all up is never cut off");
+        let walks = (0..70).map(|link| (vec![link], Stream::new(1, "w"))).collect();
+        let very_many = Switching::markov(70, walks, s(1.0), s(1.0)).possible(5);
+        assert_eq!((very_many.states.len(), very_many.complete), (5, false));
+        assert!(very_many.states[0].iter().all(|up| *up), "not of more walks than are told apart either");
+    }
+
+    #[test]
+    fn joined_signals_are_all_there_only_if_no_part_was_cut_off() {
+        let walks = |links: std::ops::Range<usize>| {
+            let walks = links.map(|link| (vec![link], Stream::new(1, "w"))).collect();
+            Switching::markov(8, walks, s(1.0), s(1.0))
+        };
+        let always = || Switching::always(8);
+        let complete = |signal: Switching| signal.possible(100).complete;
+        // Up to 16 of one and 16 of the other are listed, of both together there are 256.
+        assert!(complete(always().and(walks(0..4), Some(&[0, 1, 2, 3]))));
+        let both = || always().and(walks(0..4), Some(&[0, 1, 2, 3])).and(walks(4..8), Some(&[4, 5, 6, 7]));
+        assert!(!complete(both()) && !complete(both().and(always(), None)));
+        assert!(!complete(walks(0..8).and(always(), None)) && !complete(always().and(walks(0..8), None)));
+        // What was cut off of a part may be missing though no combination was.
+        assert!(!complete(walks(0..8).and(Switching::periodic(8, s(2.0), s(0.0), s(0.0)), None)));
     }
 
     #[test]
