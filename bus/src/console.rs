@@ -4,6 +4,7 @@ use std::fmt;
 use std::io::{IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use tracing_subscriber::EnvFilter;
@@ -23,6 +24,15 @@ pub fn init_log() {
         .with_writer(std::io::stderr)
         .log_internal_errors(false)
         .try_init();
+}
+
+/// How long to wait, as given on a command line \[s\].
+///
+/// # Errors
+/// It is no number from 0 to 1e9.
+pub fn patience(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| (0.0..=1e9).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "allowed: 0 to 1e9 s".to_string())
 }
 
 /// Whether something that was to be read from stdout got lost.

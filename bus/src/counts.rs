@@ -30,6 +30,8 @@ pub struct Counts {
 /// [`Counts`] in the making.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
+    /// Whose messages they are.
+    source: String,
     pub(crate) state_in: Counter,
     pub(crate) mission_in: Counter,
     pub(crate) state_out: Counter,
@@ -43,6 +45,25 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
+    /// Nothing has passed from this source yet.
+    pub(crate) fn of(source: &str) -> Tally {
+        Tally { source: source.into(), ..Tally::default() }
+    }
+
+    /// A frame made no sense; the first is told.
+    pub(crate) fn ignore_garbage(&self) {
+        if self.garbage.add_one() == 1 {
+            tracing::warn!("ignored what {} sent: it makes no sense; what follows is counted", self.source);
+        }
+    }
+
+    /// A message was longer than its plane carries; the first is told.
+    pub(crate) fn ignore_oversized(&self) {
+        if self.oversized.add_one() == 1 {
+            tracing::warn!("ignored what {} sent: it is too long; what follows is counted", self.source);
+        }
+    }
+
     /// A packet that was to be handed to the program had to make place for a newer one.
     pub(crate) fn drop_state(&self) {
         self.state_in.take_back(1);

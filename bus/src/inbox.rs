@@ -162,7 +162,7 @@ impl<E> Inbox<E> {
     fn take_states(&self, bytes: &[u8]) {
         let at = Instant::now();
         if bytes.len() > BUNDLE + Plane::State.limit() {
-            self.tally.oversized.add_one();
+            self.tally.ignore_oversized();
             return;
         }
         let mut messages = Messages { bytes, tally: &self.tally };
@@ -187,7 +187,7 @@ impl<E> Inbox<E> {
             return;
         }
         if !messages.bytes.is_empty() {
-            self.tally.garbage.add_one();
+            self.tally.ignore_garbage();
         }
     }
 
@@ -196,14 +196,13 @@ impl<E> Inbox<E> {
         let at = Instant::now();
         let mut gate = self.lock();
         let frame = Frame::decode(bytes);
-        if let Some(Frame::Ack { taken }) = frame {
+        if let Some(Frame::Ack { taken } | Frame::StatesTaken { taken }) = frame {
             drop(gate);
-            self.outbox.acknowledged(taken);
-            return None;
-        }
-        if let Some(Frame::StatesTaken { taken }) = frame {
-            drop(gate);
-            self.outbox.states_acknowledged(taken);
+            let ack = matches!(frame, Some(Frame::Ack { .. }));
+            let credible = if ack { self.outbox.acknowledged(taken) } else { self.outbox.states_acknowledged(taken) };
+            if !credible {
+                self.tally.ignore_garbage();
+            }
             return None;
         }
         gate.taken += cost(bytes);
@@ -217,25 +216,25 @@ impl<E> Inbox<E> {
             Some(Frame::AckNow | Frame::Ack { .. } | Frame::StatesTaken { .. }) => {}
             Some(Frame::Whole(message)) if self.is_open() => {
                 if gate.assembly.abandon() {
-                    self.tally.garbage.add_one();
+                    self.tally.ignore_garbage();
                 }
                 self.deliver(at, message.to_vec());
             }
             Some(Frame::Part { message, index, total, piece }) if self.is_open() => {
                 if index == 0 && gate.assembly.abandon() {
-                    self.tally.garbage.add_one();
+                    self.tally.ignore_garbage();
                 }
                 match gate.assembly.add(message, index, total, piece) {
                     Assembled::Done(message) => self.deliver(at, message),
                     Assembled::Waiting => {}
                     Assembled::Garbage => {
-                        self.tally.garbage.add_one();
+                        self.tally.ignore_garbage();
                     }
                 }
             }
             Some(Frame::Whole(_) | Frame::Part { .. }) if self.phase() == CLOSED => {}
             _ => {
-                self.tally.garbage.add_one();
+                self.tally.ignore_garbage();
             }
         }
         None

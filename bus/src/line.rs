@@ -125,7 +125,8 @@ impl Line {
         check_id(&config.id).map_err(Error::Refused)?;
         let (events, receiver) = queue(config.queue);
         let (signals, orders) = mpsc::channel();
-        let shared = Arc::new(Shared { id: config.id, tally: Arc::default(), inbox: Mutex::default() });
+        let tally = Arc::new(Tally::of("the network-emulator"));
+        let shared = Arc::new(Shared { id: config.id, tally, inbox: Mutex::default() });
         let mut keeper = Keeper {
             endpoint: config.endpoint,
             // A number that no other incarnation of this participant has; the standard library's hasher has a seed.

@@ -1,7 +1,8 @@
 //! The sending half of one line, the same at both ends. Sending never blocks the caller, nor anything else.
 //!
 //! A transport whose queue is full drops the newest and tells nobody, or blocks: not only its sender but, when the peer is
-//! then held for dead, one of the few threads that serve *all* sessions of the process. So it is never filled: of the mission
+//! then held for dead, one of the few threads that serve *all* sessions of the process. So none blocks, and for a peer that
+//! tells the truth of what it has taken none is ever filled: of the mission
 //! plane at most [`WINDOW`] is on its way, a quarter of what the queue holds, and of the state plane [`STATE_WINDOW`], half of
 //! it; the rest waits here, and moves on when the other end acknowledges. What waits of the mission plane is kept; of the state
 //! plane the oldest make place for the newest beyond [`STATE_BACKLOG`], and are counted. In a steady exchange of small
@@ -125,20 +126,21 @@ impl Queue {
 impl Outbox {
     /// Declares the publishers of one direction of a line.
     pub(crate) fn new(session: &Session, key: impl Fn(Plane) -> String, tally: Arc<Tally>) -> Result<Outbox> {
-        let publisher = |plane, congestion, priority| {
+        let publisher = |plane, priority| {
             session
                 .declare_publisher(key(plane))
-                .congestion_control(congestion)
+                // Only a peer that lies about what it has taken loses anything by it.
+                .congestion_control(CongestionControl::Drop)
                 .priority(priority)
                 .express(false)
                 .wait()
                 .map_err(Error::middleware)
         };
         Ok(Outbox {
-            state: publisher(Plane::State, CongestionControl::Drop, Priority::Data)?,
+            state: publisher(Plane::State, Priority::Data)?,
             // The mission plane gives way: an upload of logs must not delay the coordination of those still moving.
-            mission: publisher(Plane::Mission, CongestionControl::Block, Priority::DataLow)?,
-            acks: publisher(Plane::Mission, CongestionControl::Block, Priority::DataHigh)?,
+            mission: publisher(Plane::Mission, Priority::DataLow)?,
+            acks: publisher(Plane::Mission, Priority::DataHigh)?,
             queue: Mutex::default(),
             states: Mutex::default(),
             changed: Condvar::new(),
@@ -201,12 +203,16 @@ impl Outbox {
         Ok(())
     }
 
-    /// The other end has taken this much of the state plane.
-    pub(crate) fn states_acknowledged(&self, taken: u64) {
+    /// The other end has taken this much of the state plane; false if that is more than was sent.
+    pub(crate) fn states_acknowledged(&self, taken: u64) -> bool {
         let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        if taken > states.sent {
+            return false;
+        }
         states.taken = states.taken.max(taken);
         // A failure here is the session's end, which is noticed elsewhere.
         let _ = self.send_states(&mut states);
+        true
     }
 
     /// Sends a frame of the line's own, in order with the messages.
@@ -220,15 +226,19 @@ impl Outbox {
         let _ = self.acks.put(taken.encode()).wait();
     }
 
-    /// The other end has taken this much.
-    pub(crate) fn acknowledged(&self, taken: u64) {
+    /// The other end has taken this much; false if that is more than was sent.
+    pub(crate) fn acknowledged(&self, taken: u64) -> bool {
         let mut queue = self.lock();
+        if taken > queue.sent {
+            return false;
+        }
         if taken > queue.taken {
             queue.taken = taken;
             // A failure here is the session's end, too.
             let _ = self.enqueue(queue, std::iter::empty());
             self.changed.notify_all();
         }
+        true
     }
 
     /// Has the other end say what it has taken, once it has taken all that was sent before: also the states that wait, for
@@ -236,6 +246,7 @@ impl Outbox {
     pub(crate) fn ask_to_acknowledge(&self) -> Result<()> {
         let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
         while let Some((bundle, messages)) = states.pop() {
+            states.sent += state_cost(&bundle);
             self.put(bundle, messages)?;
         }
         drop(states);

@@ -199,8 +199,6 @@ fn router_config(endpoint: &Endpoint, rules: &[Rule]) -> Result<Config> {
         // A router otherwise sleeps half a second in open().
         ("scouting/delay", "0".to_owned()),
         ("timestamping/enabled", "false".to_owned()),
-        // A state for a participant that takes none is dropped at once: nobody else's may wait for it.
-        ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0".to_owned()),
         // Connections that say nothing must not keep the others out.
         ("transport/unicast/accept_pending", "1000".to_owned()),
         ("transport/unicast/accept_timeout", "2000".to_owned()),
@@ -228,6 +226,8 @@ fn common_config(settings: &[(&str, String)]) -> Result<Config> {
         ("transport/link/tx/lease", LEASE.as_millis().to_string()),
         ("transport/link/tx/queue/size/data", "16".to_owned()),
         ("transport/link/tx/queue/size/data_low", "16".to_owned()),
+        // What is for a peer that takes nothing is dropped at once: nobody else's may wait for it.
+        ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "0".to_owned()),
         ("transport/link/rx/max_message_size", "65536".to_owned()),
     ];
     let mut config = Config::default();

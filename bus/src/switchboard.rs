@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, RwLock};
 use std::thread::JoinHandle;
@@ -39,15 +40,17 @@ pub struct SwitchboardConfig {
     pub endpoint: Endpoint,
     /// The most participants, dead ones included.
     pub max_lines: usize,
+    /// Who was let in and has not come for so long gives the place back.
+    pub absence: Duration,
     /// The most packets of each plane that wait for the program; beyond, the oldest states and the newest others are
     /// dropped and counted.
     pub queue: usize,
 }
 
 impl SwitchboardConfig {
-    /// 512 lines and 65 536 waiting packets of each plane.
+    /// 512 lines, ten seconds to come, and 65 536 waiting packets of each plane.
     pub fn new(endpoint: Endpoint) -> SwitchboardConfig {
-        SwitchboardConfig { endpoint, max_lines: 512, queue: 1 << 16 }
+        SwitchboardConfig { endpoint, max_lines: 512, absence: Duration::from_secs(10), queue: 1 << 16 }
     }
 }
 
@@ -138,11 +141,21 @@ struct Lines(RwLock<Vec<Arc<HubLine>>>);
 struct HubLine {
     id: String,
     tally: Arc<Tally>,
+    /// Whether the program has ever heard of it.
+    known: AtomicBool,
     /// The living session's way out, if there is one.
     inbox: Mutex<Option<Arc<Inbox<HubEvent>>>>,
 }
 
 impl HubLine {
+    fn new(id: &str) -> HubLine {
+        HubLine {
+            id: id.into(),
+            tally: Arc::new(Tally::of(id)),
+            known: AtomicBool::new(false),
+            inbox: Mutex::default(),
+        }
+    }
     fn inbox(&self) -> Option<Arc<Inbox<HubEvent>>> {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -159,6 +172,14 @@ impl Lines {
         let mut lines = self.0.write().unwrap_or_else(PoisonError::into_inner);
         lines.push(Arc::new(line));
         LineId((lines.len() - 1) as u16)
+    }
+    /// Puts another line in the place of one that the program has never heard of.
+    fn replace(&self, at: LineId, line: HubLine) -> LineId {
+        let mut lines = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(place) = lines.get_mut(at.index()) {
+            *place = Arc::new(line);
+        }
+        at
     }
 }
 
@@ -185,6 +206,8 @@ impl Switchboard {
         let mut clerk = Clerk {
             endpoint: endpoint.clone(),
             max_lines: config.max_lines.min(usize::from(u16::MAX)),
+            absence: config.absence,
+            vacant: Vec::new(),
             events,
             tasks: tasks.clone(),
             lines: Arc::clone(&lines),
@@ -344,6 +367,9 @@ enum Task {
 struct Clerk {
     endpoint: Endpoint,
     max_lines: usize,
+    absence: Duration,
+    /// Lines of participants that never came: for the next.
+    vacant: Vec<LineId>,
     events: Feed<HubEvent>,
     shortcut: Arc<OnceLock<Box<Shortcut>>>,
     tasks: Sender<Task>,
@@ -447,11 +473,15 @@ impl Clerk {
         if request.version != PROTOCOL_VERSION {
             return Ok(Err(Refusal::Version { hub: PROTOCOL_VERSION, participant: request.version }));
         }
+        self.forget_absentees();
         let line = match self.by_id.get(id) {
             Some(&line) => line,
             None if self.by_id.len() >= self.max_lines => return Ok(Err(Refusal::Full { lines: self.max_lines })),
             None => {
-                let line = self.lines.add(HubLine { id: id.into(), tally: Arc::default(), inbox: Mutex::default() });
+                let line = match self.vacant.pop() {
+                    Some(vacant) => self.lines.replace(vacant, HubLine::new(id)),
+                    None => self.lines.add(HubLine::new(id)),
+                };
                 self.by_id.insert(id.into(), line);
                 line
             }
@@ -475,9 +505,25 @@ impl Clerk {
         Ok(Ok(Admission { port }))
     }
 
-    /// Ends a line's session; its participant may come back.
-    fn retire(&mut self, line: LineId) {
-        let Some((session, was_open)) = self.unplug(line) else { return };
+    /// Asking to be let in costs nothing, and places are few: who did not come gives the place back.
+    fn forget_absentees(&mut self) {
+        let is_absent = |session: &LineSession| session.inbox.is_waiting() && session.opened.elapsed() > self.absence;
+        let absent: Vec<LineId> =
+            self.sessions.iter().filter(|(_, session)| is_absent(session)).map(|(line, _)| *line).collect();
+        for line in absent {
+            let was_open = self.retire(line);
+            if let Some(place) = self.lines.get(line)
+                && !(was_open || place.known.load(Ordering::Acquire))
+            {
+                self.by_id.remove(&place.id);
+                self.vacant.push(line);
+            }
+        }
+    }
+
+    /// Ends a line's session; its participant may come back. Whether it had joined.
+    fn retire(&mut self, line: LineId) -> bool {
+        let Some((session, was_open)) = self.unplug(line) else { return false };
         if was_open {
             self.events.announce(HubEvent::Left { line });
         }
@@ -487,6 +533,7 @@ impl Clerk {
         if let Ok(closer) = closer {
             self.retired.push((rest, closer));
         }
+        was_open
     }
 
     /// Takes a line's session out of service; true if its participant had joined.
@@ -540,7 +587,7 @@ impl Clerk {
             .wait()
             .map_err(Error::middleware)?;
 
-        let up = Arc::clone(&inbox);
+        let (up, known) = (Arc::clone(&inbox), Arc::clone(&hub_line));
         let name = id.to_owned();
         session
             .declare_subscriber(up_key(id, Plane::Mission))
@@ -550,7 +597,9 @@ impl Clerk {
                 {
                     // The program can send only after the welcome: the welcome is the first thing that goes down.
                     let welcome = || _ = up.outbox.send_frame(&Frame::Welcome { nonce });
-                    up.open(HubEvent::Joined { line, id: name.clone() }, welcome);
+                    if up.open(HubEvent::Joined { line, id: name.clone() }, welcome) {
+                        known.known.store(true, Ordering::Release);
+                    }
                 }
             })
             .background()

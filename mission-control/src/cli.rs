@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use common::mission::Mission;
 use common::path::geodesy::Place;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
-use common::wire::vehicle::Phase;
+use common::wire::vehicle::{ClockPlan, Phase};
 
 use crate::console::{Count, Progress};
 use crate::gallery::{GALLERY, Gallery};
@@ -254,8 +254,8 @@ struct RunArgs {
     #[arg(long)]
     stepped: bool,
     /// Give up when the fleet is not complete after this long (s) (default: never with --attach, 60 s else)
-    #[arg(long, value_name = "SECONDS")]
-    patience: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = bus::console::patience)]
+    patience: Option<Duration>,
     /// JSON for a pipe
     #[arg(long)]
     json: bool,
@@ -543,8 +543,8 @@ fn quoted(word: String) -> String {
 
 fn run_fleet(args: RunArgs) -> Ended {
     let mission = load(&args.mission)?;
-    if !(args.speed_up.is_finite() && args.speed_up > 0.0 && args.speed_up <= 1000.0) {
-        return Err(End(2, format!("--speed-up: found {}; allowed: above 0 and at most 1000", args.speed_up)));
+    if !ClockPlan::SPEED_UPS.contains(&args.speed_up) {
+        return Err(End(2, format!("--speed-up: found {:e}; allowed: 0.001 to 1000", args.speed_up)));
     }
     warn(&mission, &theory::rows(&mission, None));
     let pace = if args.stepped { Pace::Stepped } else { Pace::Real { speed_up: args.speed_up } };
@@ -554,7 +554,7 @@ fn run_fleet(args: RunArgs) -> Ended {
         attach: args.attach,
         listen: args.listen,
         pace,
-        patience: args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64),
+        patience: args.patience,
     };
     match fly(&plan) {
         Ok(flown) => {

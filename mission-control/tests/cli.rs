@@ -83,3 +83,25 @@ fn a_sweep_over_loss_and_a_gain_needs_no_whole_keys() {
     let first = file("runs.csv").lines().nth(1 + 16 * 20).map(str::to_owned).expect("a run");
     assert!(first.split(',').any(|field| field.parse() == Ok(error)), "{error} in {first}");
 }
+
+#[test]
+fn a_patience_that_is_none_is_exit_code_2_and_no_panic() {
+    for patience in ["nan", "inf", "-1", "1e300", "soon"] {
+        let flag = format!("--patience={patience}");
+        let wrong = run(&[&["run", "m.toml", "--attach"][..], &[&flag]].concat());
+        let text = String::from_utf8_lossy(&wrong.stderr).into_owned();
+        assert_eq!(wrong.status.code(), Some(2), "{text}");
+        assert!(text.contains("allowed: 0 to 1e9 s") && !text.contains("panicked"), "{text}");
+    }
+}
+
+#[test]
+fn a_speed_up_that_nobody_can_fly_is_exit_code_2() {
+    let mission = concat!(env!("CARGO_MANIFEST_DIR"), "/../missions/auv-helix.toml");
+    for speed_up in ["nan", "0", "1e-308", "1001"] {
+        let wrong = run(&["run", mission, "--speed-up", speed_up]);
+        let text = String::from_utf8_lossy(&wrong.stderr).into_owned();
+        assert_eq!(wrong.status.code(), Some(2), "{text}");
+        assert!(text.contains("allowed: 0.001 to 1000"), "{text}");
+    }
+}

@@ -47,8 +47,8 @@ pub struct Args {
     #[arg(long, value_name = "DIR", default_value = "logs", env = "CPF_LOGS")]
     pub logs: PathBuf,
     /// Give up when the network-emulator has not been found for this long (s) (default: never)
-    #[arg(long, value_name = "SECONDS")]
-    pub patience: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = bus::console::patience)]
+    pub patience: Option<Duration>,
     /// End when mission-control has collected the log of a flight, or when nothing has been flown for ten minutes
     #[arg(long)]
     pub once: bool,
@@ -71,7 +71,7 @@ pub fn run(args: Args) -> ExitCode {
         return ExitCode::from(4);
     }
     let mut config = LineConfig::new(args.connect, id.as_str());
-    config.patience = args.patience.filter(|s| s.is_finite() && *s >= 0.0).map(Duration::from_secs_f64);
+    config.patience = args.patience;
     let (line, events) = match Line::connect(config) {
         Ok(line) => line,
         Err(error) => {

@@ -23,3 +23,14 @@ fn a_wrong_option_is_exit_code_2_and_no_panic() {
     let text = String::from_utf8_lossy(&wrong.stderr).into_owned();
     assert!(text.contains("--no-such-option") && !text.contains("panicked"), "{text}");
 }
+
+#[test]
+fn a_patience_that_is_none_is_exit_code_2_and_no_panic() {
+    for patience in ["nan", "inf", "-1", "1e300", "soon"] {
+        let flag = format!("--patience={patience}");
+        let wrong = run(&[&["--id", "a"][..], &[&flag]].concat());
+        let text = String::from_utf8_lossy(&wrong.stderr).into_owned();
+        assert_eq!(wrong.status.code(), Some(2), "{text}");
+        assert!(text.contains("allowed: 0 to 1e9 s") && !text.contains("panicked"), "{text}");
+    }
+}

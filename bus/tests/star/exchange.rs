@@ -137,6 +137,12 @@ fn a_participant_that_takes_nothing_costs_the_oldest_states_with_a_count_and_get
     };
     put(hello(7));
     let number = expect_joined(&hub_events, "idler");
+    // What was never sent cannot have arrived.
+    put([&[0x14][..], &u64::MAX.to_le_bytes()].concat());
+    put([&[0x12][..], &u64::MAX.to_le_bytes()].concat());
+    put([&[0x01][..], b"fence"].concat());
+    assert_eq!(expect_up(&hub_events, number), (Plane::Mission, b"fence".to_vec()));
+    assert_eq!(hub.counts(number).expect("known").garbage, 2);
     // It never says that anything has arrived, as one that is frozen.
     (0..COUNT).for_each(|i| hub.send(number, Plane::State, &i.to_le_bytes()).expect("joined"));
     let counts = hub.counts(number).expect("known");

@@ -70,6 +70,37 @@ fn the_hub_says_why_it_lets_somebody_not_in() {
 }
 
 #[test]
+fn who_is_let_in_and_never_comes_gives_its_place_back() {
+    let mut config = SwitchboardConfig::new(any_port());
+    (config.max_lines, config.absence) = (2, Duration::from_millis(200));
+    let (hub, hub_events) = Switchboard::open(config).expect("the hub opens");
+    let (auv, _events, number) = joined(&hub, &hub_events, "auv1");
+    let lobby = plain_client(hub.endpoint().port());
+    ask_for_line(&lobby, "ghost", 1).expect("there is a place");
+    let deadline = Instant::now() + PATIENCE;
+    let admitted = || match ask_for_line(&lobby, "auv2", 2) {
+        Ok(port) => Some(port),
+        Err(refusal) => {
+            assert_eq!(refusal, "full: 2");
+            None
+        }
+    };
+    while admitted().is_none() {
+        assert!(Instant::now() < deadline, "the ghost has its place for ever");
+    }
+    // Who has come has it for good, and the next has the ghost's.
+    let client = plain_client(ask_for_line(&lobby, "auv2", 2).expect("let in"));
+    let put = client.put("cpf/auv2/up/mission", hello(2)).congestion_control(zenoh::qos::CongestionControl::Block);
+    zenoh::Wait::wait(put).expect("open");
+    let second = expect_joined(&hub_events, "auv2");
+    assert_eq!((number.index(), second.index()), (0, 1));
+    assert_eq!(hub.id(second).as_deref(), Some("auv2"));
+    auv.close();
+    assert_eq!(next(&hub_events), HubEvent::Left { line: number });
+    assert_eq!(ask_for_line(&lobby, "ghost", 3), Err("full: 2".into()), "it may come back");
+}
+
+#[test]
 fn a_killed_participant_leaves_and_its_successor_gets_the_same_line() {
     let (hub, hub_events) = hub();
     let mut lines = Vec::new();

@@ -36,7 +36,7 @@ pub enum Garbage {
     Malformed,
     /// Changed on the way: its checksum does not fit.
     Corrupt,
-    /// A number that is not finite.
+    /// A number that is not finite, or beyond all sense.
     NotFinite,
     /// Of another mission.
     WrongMission,

@@ -19,6 +19,9 @@ pub const STATE_LIMIT: usize = 64;
 /// Most acknowledgements in one message: what fits below [`STATE_LIMIT`].
 pub const MOST_HEARD: usize = 4;
 
+/// Largest size of ξ and of a second scalar in a message: a thousand times the largest that a mission may begin with.
+pub const LARGEST_NUMBER: f64 = 1e12;
+
 const MAGIC: [u8; 2] = *b"CX";
 const CHECKSUM: usize = 4;
 /// Shortest message: without scalar and without acknowledgements.
@@ -198,7 +201,8 @@ impl Word {
         if !rest.is_empty() {
             return Err(Garbage::Malformed);
         }
-        if !xi.is_finite() || scalar.is_some_and(|scalar| !scalar.is_finite()) {
+        let makes_sense = |number: f64| number.abs() <= LARGEST_NUMBER;
+        if !makes_sense(xi) || !scalar.is_none_or(makes_sense) {
             return Err(Garbage::NotFinite);
         }
         Ok(word)
@@ -317,9 +321,16 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_not_finite_stays_off_the_air() {
-        let state = CoordinationState { xi: f64::NAN, ..state() };
-        assert_eq!(CoordinationState::decode(&state.encode()), Err(Garbage::NotFinite));
+    fn a_number_that_is_not_finite_or_beyond_all_sense_stays_off_the_air() {
+        for number in [f64::NAN, f64::INFINITY, -1.7e308, 1.001e12] {
+            for state in
+                [CoordinationState { xi: number, ..state() }, CoordinationState { scalar: Some(number), ..state() }]
+            {
+                assert_eq!(CoordinationState::decode(&state.encode()), Err(Garbage::NotFinite));
+            }
+        }
+        let largest = CoordinationState { xi: -LARGEST_NUMBER, scalar: Some(LARGEST_NUMBER), ..state() };
+        assert_eq!(CoordinationState::decode(&largest.encode()), Ok(largest));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! network-emulator ↔ vehicle, on the mission plane.
 
+use std::ops::RangeInclusive;
+
 use bincode::{Decode, Encode};
 
 use crate::time::Time;
@@ -16,6 +18,19 @@ pub enum ClockPlan {
     },
     /// In lock step, as fast as the processes can.
     Stepped,
+}
+
+impl ClockPlan {
+    /// How many mission seconds there may be in one of wall clock.
+    pub const SPEED_UPS: RangeInclusive<f64> = 0.001..=1000.0;
+
+    /// Whether it is one by which anybody can fly.
+    pub fn is_sound(self) -> bool {
+        match self {
+            ClockPlan::Real { speed_up, .. } => ClockPlan::SPEED_UPS.contains(&speed_up),
+            ClockPlan::Stepped => true,
+        }
+    }
 }
 
 /// A formation speed that holds from an instant on.

@@ -175,6 +175,8 @@ impl Emulator {
         }
         self.catch_up(now, now);
         self.present[vehicle] = present;
+        // Who used the vehicle's name while it was gone must not silence it by a number that it reaches late or never.
+        self.newest[vehicle] = None;
         self.record_links(now, false);
     }
 

@@ -2,6 +2,8 @@
 
 use proptest::prelude::*;
 
+use common::wire::state::LARGEST_NUMBER;
+
 use super::*;
 use crate::ledger::Ledger;
 
@@ -200,7 +202,7 @@ fn sound_takes_its_time_from_where_the_sender_is() {
 #[test]
 fn a_message_is_heard_within_its_range_and_not_beyond() {
     let mission = mission("range = { disc = { radius_m = 100.0 } }");
-    for (xi, fate) in [(99.0, Fate::Delivered), (101.0, Fate::OutOfRange), (f64::MAX, Fate::OutOfRange)] {
+    for (xi, fate) in [(99.0, Fate::Delivered), (101.0, Fate::OutOfRange), (LARGEST_NUMBER, Fate::OutOfRange)] {
         let mut emulator = Emulator::new(mission.clone(), None);
         emulator.handle(seconds(1.0), Some(Sent { from: 0, bytes: state_at(&mission, 0, 0, xi) }));
         emulator.handle(seconds(1.0), None);

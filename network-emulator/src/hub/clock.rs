@@ -5,18 +5,23 @@ use common::record::{Record, Row, SpeedRow};
 use common::time::Time;
 use common::wire::vehicle::{ClockPlan, Phase, SpeedCommand, ToVehicle};
 
-use super::{Hub, HubOutput, Opened};
+use super::{Hub, HubOutput, LATEST_BEGIN_S, Opened};
 use crate::emulator::{Channel, Emulator, Sent};
 use crate::lockstep::Lockstep;
 
 impl Hub {
     pub(super) fn clock_started(&mut self, now: Time, clock: ClockPlan) {
         let Some(load) = &mut self.load else { return };
-        self.flown = true;
         let speed_up = match clock {
             ClockPlan::Real { speed_up, .. } => Some(speed_up),
             ClockPlan::Stepped => None,
         };
+        if load.adopted && now.secs() < -LATEST_BEGIN_S * speed_up.unwrap_or(1.0) {
+            self.load = None;
+            self.take_seats();
+            return self.say("a vehicle tells of a flight that has not begun: ignored".into());
+        }
+        self.flown = true;
         let real = speed_up.is_some();
         load.phase = Phase::Running;
         load.clock = Some(clock);

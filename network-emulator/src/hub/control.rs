@@ -8,7 +8,7 @@ use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
 
-use super::{COLLECTOR, HUB, Hub, HubOutput, Known, Load, SPEED_LEAD_S};
+use super::{COLLECTOR, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
 use crate::emulator::Emulator;
 
 impl Hub {
@@ -145,6 +145,11 @@ impl Hub {
     }
 
     pub(super) fn start(&mut self, pace: Pace) {
+        if let Pace::Real { speed_up } = pace
+            && !ClockPlan::SPEED_UPS.contains(&speed_up)
+        {
+            return self.refuse(format!("found a speed-up of {speed_up}; allowed: 0.001 to 1000"));
+        }
         let Some(load) = &self.load else { return self.refuse("no mission is loaded".into()) };
         if load.phase == Phase::Running {
             return self.refuse(format!("{} is already under way", load.mission.name));
@@ -172,6 +177,9 @@ impl Hub {
         let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else {
             return self.refuse("no flight is under way, so there is no speed to change".into());
         };
+        if load.speeds.len() >= MOST_SPEEDS {
+            return self.refuse(format!("{MOST_SPEEDS} speeds were commanded in this flight; allowed: no more"));
+        }
         if let Err(reason) = load.mission.fits_speed(speed) {
             return self.refuse(format!("a formation speed of {speed} cannot be flown: {reason}"));
         }

@@ -31,6 +31,12 @@ pub const HUB: &str = "network-emulator";
 /// A speed commanded now holds from this much later, so that every vehicle has it in time \[s of wall clock\].
 const SPEED_LEAD_S: f64 = 0.25;
 
+/// Most speeds that are commanded in a flight: one a second for nearly three hours.
+const MOST_SPEEDS: usize = 10_000;
+
+/// A flight that is taken up from a vehicle does not begin later than this much from now \[s of wall clock\].
+const LATEST_BEGIN_S: f64 = 60.0;
+
 /// What can happen to the hub, beside the passing of time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HubInput {
@@ -151,6 +157,8 @@ struct Known {
     seat: usize,
     phase: Phase,
     reason: String,
+    /// Whether it told of a flight that cannot be.
+    doubted: bool,
 }
 
 struct Load {

@@ -315,3 +315,82 @@ fn the_channel_knows_who_has_left_and_who_is_back() {
     hub.handle(Time::from_secs(25.0), Some(joined("auv2")));
     assert_eq!(say(&mut hub, 33.0, 330), Some(Fate::Delivered));
 }
+
+#[test]
+fn nobody_is_believed_what_cannot_have_been_commanded() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let hello = |hub: &mut Hub, id: &str, speeds: Vec<(i64, f64)>, epoch_unix_ns: i64| {
+        let command = |(at, speed): (i64, f64)| SpeedCommand { at: Time::from_nanos(at), speed };
+        let flight = running(speeds.into_iter().map(command).collect(), epoch_unix_ns);
+        let hello = FromVehicle::Hello { phase: Phase::Finished, flight };
+        hub.handle(Time::from_secs(50.0), Some(HubInput::FromVehicle(id.into(), hello)));
+        outputs(hub)
+    };
+    hub.handle(Time::ZERO, Some(HubInput::Joined { id: "outsider".into(), seat: 7 }));
+    let is_told = |said: &[HubOutput]| IDS.iter().any(|id| !told(said, id).is_empty());
+    assert!(!is_told(&hello(&mut hub, "outsider", vec![(1, 0.2)], 0)), "it is not of the mission");
+    for speed in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300] {
+        let said = hello(&mut hub, "auv2", vec![(1, 0.1), (1, speed)], 0);
+        assert!(!is_told(&said), "{speed}: {said:?}");
+    }
+    assert!(!is_told(&hello(&mut hub, "auv2", vec![(1, 0.2)], -7)), "of another flight");
+    let many: Vec<(i64, f64)> = (0..200_000).map(|at| (at, 0.1)).collect();
+    assert!(!is_told(&hello(&mut hub, "auv2", many, 0)));
+    // What was commanded is told to all, once.
+    let said = hello(&mut hub, "auv2", vec![(1, 0.2), (1, 0.2)], 0);
+    assert_eq!(told(&said, "auv1").len(), 1, "{said:?}");
+    assert!(told(&hello(&mut hub, "auv3", vec![(1, 0.2)], 0), "auv1").is_empty());
+}
+
+#[test]
+fn a_hub_without_memory_takes_up_no_flight_that_cannot_be() {
+    let hello = |clock: ClockPlan, speeds: Vec<SpeedCommand>| {
+        let mut hub = Hub::new();
+        let plan = FlightPlan { mission: HELIX.into(), clock, speeds };
+        let said = join(&mut hub, "auv3", Phase::Running, Some(plan));
+        (hub, said.iter().any(|output| matches!(output, HubOutput::FollowClock(_))))
+    };
+    for speed_up in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e300] {
+        assert!(!hello(ClockPlan::Real { epoch_unix_ns: 0, speed_up }, vec![]).1, "{speed_up}");
+    }
+    assert!(!hello(epoch(), vec![SpeedCommand { at: Time::ZERO, speed: f64::NAN }]).1);
+    let (hub, _) = hello(ClockPlan::Stepped, vec![]);
+    assert_eq!(hub.phase(), Phase::Aborted, "a stepped run does not outlive its hub");
+    // One that begins in a year is seen when its clock runs.
+    let (mut hub, followed) = hello(epoch(), vec![]);
+    assert!(followed);
+    hub.handle(Time::from_secs(-3e7), Some(HubInput::ClockStarted(epoch())));
+    assert_eq!(hub.phase(), Phase::Idle);
+    assert!(refusal(&ask(&mut hub, Time::ZERO, ToFleet::Upload { mission: HELIX.into() })).is_none(), "it is free");
+}
+
+#[test]
+fn a_clock_that_nobody_can_fly_by_is_not_started() {
+    let mut hub = Hub::new();
+    IDS.iter().for_each(|id| drop(join(&mut hub, id, Phase::Idle, None)));
+    ask(&mut hub, Time::ZERO, ToFleet::Upload { mission: HELIX.into() });
+    IDS.iter().for_each(|id| drop(arm(&mut hub, Time::ZERO, id)));
+    for speed_up in [f64::NAN, 0.0, 1e-308, 1e300] {
+        let said = ask(&mut hub, Time::ZERO, ToFleet::Start { pace: Pace::Real { speed_up } });
+        assert!(refusal(&said).is_some_and(|why| why.contains("0.001 to 1000")), "{said:?}");
+    }
+}
+
+#[test]
+fn a_vehicle_that_comes_back_is_heard_whatever_was_said_in_its_name() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    outputs(&mut hub);
+    let say = |hub: &mut Hub, at: f64, seq: u32| {
+        let sent = hub.totals()[0];
+        let state =
+            CoordinationState { mission: digest(HELIX), sender: 0, seq, made: Time::ZERO, xi: 1.0, scalar: None };
+        hub.handle(Time::from_secs(at), Some(HubInput::State(0, state.encode().into())));
+        hub.totals()[0] > sent
+    };
+    assert!(say(&mut hub, 1.0, u32::MAX));
+    assert!(!say(&mut hub, 2.0, 20), "older than what was said");
+    hub.handle(Time::from_secs(3.0), Some(HubInput::Left("auv1".into())));
+    hub.handle(Time::from_secs(4.0), Some(joined("auv1")));
+    assert!(say(&mut hub, 5.0, 50));
+}

@@ -1,12 +1,13 @@
 //! What the vehicles say to the hub, and their comings and goings.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use common::mission::{Mission, digest};
 use common::time::Time;
 use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, Phase, SpeedCommand, ToVehicle};
 
-use super::{Hub, HubOutput, Known, Load};
+use super::{Hub, HubOutput, Known, Load, MOST_SPEEDS};
 
 impl Hub {
     pub(super) fn joined(&mut self, now: Time, id: String, seat: usize) {
@@ -15,6 +16,7 @@ impl Hub {
             seat,
             phase: Phase::Idle,
             reason: String::new(),
+            doubted: false,
         });
         (known.connected, known.seat) = (true, seat);
         self.take_seats();
@@ -140,9 +142,13 @@ impl Hub {
                     self.arm(id);
                 }
             }
-            (Some(load), Some(flight)) if same(load, &flight) && phase != Phase::Armed => {
+            (Some(load), Some(flight))
+                if same(load, &flight) && phase != Phase::Armed && load.mission.index_of(id).is_some() =>
+            {
                 // It has flown on alone; tell it what it missed.
-                self.learn(&flight.speeds);
+                if load.clock == Some(flight.clock) {
+                    self.learn(id, &flight.speeds);
+                }
                 for command in self.load.as_ref().map_or(Vec::new(), |load| load.speeds.clone()) {
                     self.tell_vehicle(id, ToVehicle::Speed(command));
                 }
@@ -153,13 +159,31 @@ impl Hub {
     }
 
     /// Speeds that a vehicle knows of and a hub that was killed since does not, nor perhaps the other vehicles.
-    fn learn(&mut self, speeds: &[SpeedCommand]) {
+    fn learn(&mut self, id: &str, speeds: &[SpeedCommand]) {
         let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else { return };
-        let news: Vec<SpeedCommand> = speeds.iter().copied().filter(|command| !load.speeds.contains(command)).collect();
+        let of = |command: &SpeedCommand| (command.at, command.speed.to_bits());
+        let mut known: BTreeSet<(Time, u64)> = load.speeds.iter().map(of).collect();
+        let is_news = |command: &&SpeedCommand| known.insert(of(command));
+        let news: Vec<SpeedCommand> = speeds.iter().take(MOST_SPEEDS + 1).filter(is_news).copied().collect();
+        if news.is_empty() {
+            return;
+        }
+        if load.speeds.len() + news.len() > MOST_SPEEDS || !are_credible(&load.mission, &news) {
+            return self.doubt(id);
+        }
         load.speeds.extend(&news);
         load.speeds.sort_by_key(|command| command.at);
         news.iter().for_each(|command| self.tell_fleet(&ToVehicle::Speed(*command)));
         self.record_speeds(&news);
+    }
+
+    /// What a vehicle tells of its flight cannot be: said once.
+    fn doubt(&mut self, id: &str) {
+        if let Some(known) = self.vehicles.get_mut(id)
+            && !std::mem::replace(&mut known.doubted, true)
+        {
+            self.say(format!("{id} tells of a flight that nobody can have started or commanded: ignored"));
+        }
     }
 
     /// After a restart: the vehicles know what the hub has forgotten.
@@ -167,6 +191,10 @@ impl Hub {
         let Ok(mission) = Mission::parse("a vehicle's mission", &flight.mission) else { return };
         if mission.index_of(id).is_none() {
             return;
+        }
+        let credible = flight.speeds.len() <= MOST_SPEEDS && are_credible(&mission, &flight.speeds);
+        if !(credible && flight.clock.is_sound()) {
+            return self.doubt(id);
         }
         self.load(Arc::new(mission), true);
         if let Some(known) = self.vehicles.get_mut(id) {
@@ -181,7 +209,8 @@ impl Hub {
                 self.say(format!("{id} is flying {name}: carrying on"));
             }
             (phase, _) => {
-                load.phase = phase;
+                // A stepped run does not outlive its hub.
+                load.phase = if phase == Phase::Running { Phase::Aborted } else { phase };
                 load.now = load.mission.end;
             }
         }
@@ -206,6 +235,12 @@ impl Hub {
             self.note(now, &format!("{id} joins the flight under way"));
         }
     }
+}
+
+/// Whether somebody can have commanded these speeds in this mission.
+fn are_credible(mission: &Mission, speeds: &[SpeedCommand]) -> bool {
+    let fastest = speeds.iter().map(|command| command.speed.abs()).max_by(f64::total_cmp);
+    fastest.is_none_or(|fastest| fastest.is_finite() && mission.fits_speed(fastest).is_ok())
 }
 
 /// Whether a vehicle under way is in another flight than the fleet: it missed that its own was ended.
