@@ -18,6 +18,8 @@ const POLL: Span = Span::from_nanos(200_000_000);
 const PIECE_PATIENCE: Span = Span::from_nanos(3_000_000_000);
 /// How often the same piece is asked for before the log is given up.
 const PIECE_TRIES: u32 = 5;
+/// A mission that the fleet does not have after this long is uploaded again, and a start that it did not make is asked for again.
+const UPLOAD_PATIENCE: Span = Span::from_nanos(1_000_000_000);
 /// How long a vehicle that is out of reach is waited for when the flight is over.
 const RETURN_PATIENCE: Span = Span::from_nanos(5_000_000_000);
 
@@ -100,6 +102,8 @@ pub struct Conduct {
     step: Step,
     since: Time,
     next_poll: Time,
+    /// When the mission was last sent.
+    uploaded: Time,
     /// The mission was loaded: from here on, a flight of it that is over was ended before its start.
     loaded: bool,
     ended: Phase,
@@ -130,6 +134,7 @@ impl Conduct {
             step: Step::Contact,
             since: Time::ZERO,
             next_poll: Time::ZERO,
+            uploaded: Time::ZERO,
             loaded: false,
             ended: Phase::Idle,
             flown: None,
@@ -188,11 +193,10 @@ impl Conduct {
                 self.flying(now, &status, true);
             }
             Step::Contact => {
-                let mission = self.mission.text.clone();
-                self.send(ToFleet::Upload { mission });
-                self.flown = None;
                 self.enter(Step::Arming, now);
+                self.upload(now);
             }
+            Step::Arming | Step::Starting if !same => self.not_loaded(now, status.phase),
             // A vehicle told a hub without memory of the flight that it is in.
             Step::Arming | Step::Starting if same && status.phase == Phase::Running => self.enter(Step::Flying, now),
             // An answer from before the mission was loaded speaks of the flight before.
@@ -203,12 +207,37 @@ impl Conduct {
                 self.loaded |= status.phase == Phase::Armed;
                 self.arming(now, &status);
             }
+            // It did not hear of the start, or forgot it.
+            Step::Starting if status.phase == Phase::Armed && now - self.since > UPLOAD_PATIENCE => {
+                self.enter(Step::Arming, now);
+            }
             Step::Starting if same && is_over(status.phase) => {
                 self.enter(Step::Flying, now);
                 self.flying(now, &status, same);
             }
             Step::Flying => self.flying(now, &status, same),
             _ => {}
+        }
+    }
+
+    fn upload(&mut self, now: Time) {
+        let mission = self.mission.text.clone();
+        self.send(ToFleet::Upload { mission });
+        self.uploaded = now;
+        self.flown = None;
+        self.loaded = false;
+    }
+
+    /// The fleet does not have the mission that it was sent: the answer is from before, or the network-emulator was killed
+    /// meanwhile and has lost it.
+    fn not_loaded(&mut self, now: Time, phase: Phase) {
+        if phase == Phase::Running {
+            self.fail("the fleet has gone on to another mission".to_string());
+        } else if self.patience.is_some_and(|patience| now - self.since > patience) {
+            self.fail("the network-emulator does not take the mission".to_string());
+        } else if now - self.uploaded > UPLOAD_PATIENCE {
+            self.step = Step::Arming;
+            self.upload(now);
         }
     }
 
@@ -432,6 +461,36 @@ mod tests {
         assert_eq!(said[0], ConductOutput::Over { phase: Phase::Finished, aborted: vec![] });
         assert!(matches!(&said[1], ConductOutput::Done(landing) if landing.phase == Phase::Finished));
         assert_eq!(conduct.poll_timeout(), None);
+    }
+
+    #[test]
+    fn a_network_emulator_that_lost_the_mission_gets_it_again_before_the_start() {
+        for armed in [Phase::Idle, Phase::Armed] {
+            let mut conduct = conduct(true);
+            hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+            // Said before the mission was loaded, heard after it was sent.
+            assert_eq!(hears(&mut conduct, 0.1, FromFleet::Status(status(Phase::Idle, "", Phase::Idle))), vec![]);
+            hears(&mut conduct, 0.2, FromFleet::Status(status(Phase::Armed, HELIX, armed)));
+            let said = hears(&mut conduct, 3.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+            assert!(matches!(&said[..], [ConductOutput::Send(ToFleet::Upload { .. })]), "{said:?}");
+            let said = hears(&mut conduct, 3.2, FromFleet::Status(status(Phase::Armed, HELIX, Phase::Armed)));
+            assert_eq!(said, vec![ConductOutput::Send(ToFleet::Start { pace: Pace::Stepped })]);
+            // One that forgets it again and again is not waited for without end.
+            let said = hears(&mut conduct, 99.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+            assert!(matches!(&said[..], [ConductOutput::Failed(_)]), "{said:?}");
+        }
+    }
+
+    #[test]
+    fn a_start_that_was_not_heard_is_asked_for_again() {
+        let mut conduct = conduct(true);
+        hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
+        let armed = || FromFleet::Status(status(Phase::Armed, HELIX, Phase::Armed));
+        let start = vec![ConductOutput::Send(ToFleet::Start { pace: Pace::Stepped })];
+        assert_eq!(hears(&mut conduct, 0.2, armed()), start);
+        assert_eq!(hears(&mut conduct, 0.4, armed()), vec![], "it may be on its way");
+        hears(&mut conduct, 2.0, armed());
+        assert_eq!(hears(&mut conduct, 2.2, armed()), start);
     }
 
     #[test]

@@ -161,8 +161,15 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
 
     let logs = if own { folder::logs(&folder, plan.mission.digest) } else { folder::recordings_in(&collected) };
     if logs.is_empty() {
-        let reason = format!("nothing was recorded: {}; see logs/ in {}", missing.join(", "), folder.display());
-        return Err(Failure::Unreachable(reason));
+        let why = format!("nothing was recorded: {}", missing.join(", "));
+        if let Some(line) = line {
+            // Nor will there ever be: the next run of the mission must not look for it again.
+            let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
+            line.close();
+            discard(&folder);
+            return Err(Failure::Files(why));
+        }
+        return Err(Failure::Files(format!("{why}; see logs/ in {}", folder.display())));
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
     missing.extend(folder::shortcomings(&merged));
@@ -484,7 +491,7 @@ impl Port for ConductPort<'_> {
     fn perform(&mut self, output: ConductOutput, _clock: &mut Clock) -> Next<Self> {
         match output {
             ConductOutput::Send(message) => {
-                // What is not sent is asked again with the next poll.
+                // What is not sent is sent again when an answer shows that it was not heard.
                 let _ = self.line.send(Plane::Mission, &wire::encode(&message));
             }
             ConductOutput::Progress(step, status) => self.tell(step, status.as_ref()),
@@ -507,7 +514,8 @@ impl Port for ConductPort<'_> {
         }
         if self.stop.is_raised() && !self.interrupted {
             self.interrupted = true;
-            if !self.own {
+            let has_begun = !matches!(conduct.step(), Step::Contact | Step::Arming);
+            if !self.own && has_begun {
                 let reason = "left; the fleet flies on. Attach again with the same command, or end it with: mission-control stop";
                 return Next::Exit(Err(Failure::Detached(reason.to_string())));
             }

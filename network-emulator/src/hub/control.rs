@@ -207,6 +207,8 @@ impl Hub {
         let now = if was_running { load.lockstep.as_ref().map_or(now, |l| l.done()) } else { load.now };
         load.phase = Phase::Aborted;
         load.now = now;
+        // Of a flight that was not there is nothing to collect.
+        load.collected = !was_running;
         if was_running {
             load.emulator.finish(now);
             self.drain_emulator();
