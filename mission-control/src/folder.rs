@@ -107,6 +107,9 @@ pub struct HostFacts {
     /// Vehicles that gave up, and why.
     #[serde(default)]
     pub aborted: Vec<String>,
+    /// Whether it was merged without the mission-control that flew it: what was still being recorded then came later.
+    #[serde(default)]
+    pub salvaged: bool,
 }
 
 impl HostFacts {
@@ -127,6 +130,7 @@ impl HostFacts {
             wall_s,
             missing,
             aborted,
+            salvaged: false,
         }
     }
 }
@@ -147,6 +151,10 @@ pub fn finish(folder: &Path, host: &HostFacts) -> Result<(Summary, ClockSummary)
     report(folder)
 }
 
+fn host_of(folder: &Path) -> Option<HostFacts> {
+    serde_json::from_slice(&fs::read(folder.join(HOST)).ok()?).ok()
+}
+
 fn write_host(folder: &Path, host: &HostFacts) -> Result<(), String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
     write(&folder.join(HOST), &json)
@@ -165,7 +173,7 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     let mut facts = facts_at(&mission, speed_in_force(&mission, &recording.exact, end));
     facts.duration_s = end.secs();
     // A recording by itself has no host facts beside it.
-    let host = fs::read(folder.join(HOST)).ok().and_then(|json| serde_json::from_slice::<HostFacts>(&json).ok());
+    let host = host_of(folder);
     let notes =
         host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)).collect();
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
@@ -217,13 +225,14 @@ pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Merges what the processes of a run recorded, if nobody did: mission-control was killed before. Gives what is to be
-/// told of it; `None` if there is a recording, or nothing to make it of.
+/// Merges what the processes of a run recorded, if nobody did: mission-control was killed before. Also again, if some still
+/// recorded the last time. Gives what is to be told of it; `None` if there is a whole recording, or nothing to make it of.
 ///
 /// # Errors
 /// Which file is to blame, and why.
 pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
-    if folder.join(RECORDING).exists() || !folder.join(MISSION).exists() {
+    let is_part = host_of(folder).is_some_and(|host| host.salvaged && !host.missing.is_empty());
+    if (folder.join(RECORDING).exists() && !is_part) || !folder.join(MISSION).exists() {
         return Ok(None);
     }
     let mission = load(&folder.join(MISSION))?;
@@ -236,7 +245,8 @@ pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
     let missing = shortcomings(&merged);
     let mut notes = vec![format!("Merged from {} logs after the run: mission-control did not end it.", logs.len())];
     notes.extend(missing.iter().map(|text| format!("Missing: {text}")));
-    write_host(folder, &HostFacts::now(&how, None, 0.0, missing, Vec::new()))?;
+    let host = HostFacts { salvaged: true, ..HostFacts::now(&how, None, 0.0, missing, Vec::new()) };
+    write_host(folder, &host)?;
     Ok(Some(notes))
 }
 

@@ -83,6 +83,10 @@ fn assert_flown(rows: &[&StateRow], end_s: f64) {
     assert!(first < 5.0 && last == end_s, "{} flew from {first} to {last} s", rows[0].vehicle);
 }
 
+fn all_fly(status: &Value) -> bool {
+    status["phase"] == "running" && IDS.iter().all(|id| is_flying(status, id))
+}
+
 fn now(status: &Value) -> f64 {
     status["now_s"].as_f64().expect("a time")
 }
@@ -296,6 +300,45 @@ fn a_flight_that_is_stopped_while_it_waits_for_a_vehicle_ends() {
     ground.controlled(0, &["stop", "--attach", &endpoint]);
     control.ends_with(1);
     assert!(control.stderr().contains("stopped before the start"), "{}", control.stderr());
+    // Of a flight that was not there is nothing to collect: the next one is flown.
+    let _c = ground.vehicle("c", &endpoint);
+    let mut next = conduct(&ground, &endpoint, "next");
+    ground.status_until(&endpoint, "they fly", all_fly);
+    ground.controlled(0, &["stop", "--attach", &endpoint]);
+    next.ends_with(1);
+    assert!(ground.path("next/report.html").exists());
+}
+
+#[test]
+fn an_emulator_that_is_killed_before_the_start_gets_the_mission_again() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text(MISSION));
+    let (mut emulator, endpoint) = ground.emulator(&lasting_endpoint());
+    let _vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
+    let mut control = conduct(&ground, &endpoint, "run");
+    until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+    emulator.kill();
+    let (_emulator, _) = ground.emulator(&endpoint);
+    let _c = ground.vehicle("c", &endpoint);
+    ground.status_until(&endpoint, "they fly", all_fly);
+    ground.controlled(0, &["stop", "--attach", &endpoint]);
+    control.ends_with(1);
+    assert!(ground.path("run/report.html").exists());
+}
+
+#[test]
+fn a_run_that_is_left_before_its_start_says_so_and_leaves_nothing() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text(MISSION));
+    let (_emulator, endpoint) = ground.emulator("tcp/127.0.0.1:0");
+    let _vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
+    let mut control = conduct(&ground, &endpoint, "run");
+    until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+    control.terminate();
+    control.ends_with(1);
+    let said = control.stderr();
+    assert!(said.contains("interrupted before the start") && !said.contains("flies on"), "{said}");
+    assert!(!ground.path("run").exists());
 }
 
 /// Robots that diverge within a second or two at a formation speed that none of them can fly.
