@@ -254,13 +254,6 @@ fn starts(signals: &Signals, own: Option<Signal>, quest: &Quest) -> Vec<Signal> 
     own.into_iter().chain(admitted).take((quest.flights / 2).max(CHAINS)).collect()
 }
 
-/// Dwell times that are searched one after the other, down to the one that is allowed: what a longer one admits, a shorter
-/// one admits too, and signals that change seldom are fewer and often hurt more.
-fn dwells(Allowance { t_0, dwell, .. }: Allowance) -> Vec<Span> {
-    let longer = (1..4).map(|part| Span::from_nanos(t_0.nanos() / 3i64.pow(part))).filter(|&longer| longer > dwell);
-    longer.chain([dwell]).collect()
-}
-
 /// Flies the starts, then climbs from the worst of them: takes every change that hurts no less. With each dwell time it
 /// spends half of the flights that are left, and begins with the worst so far that keeps it.
 ///
@@ -278,7 +271,7 @@ fn climb<'a>(
         left -= 1;
         flown.push((hurts(start)?, start.clone()));
     }
-    let dwells = dwells(signals.allowance());
+    let dwells = signals.allowance().dwells();
     for (stage, &dwell) in dwells.iter().enumerate() {
         let signals = signals.with_dwell(dwell);
         let mut spend = if stage + 1 < dwells.len() { left / 2 } else { left };

@@ -33,6 +33,15 @@ pub struct Allowance {
     pub dwell: Span,
 }
 
+impl Allowance {
+    /// Parts of T_0, the longest first, down to the dwell time: what a longer dwell time admits, a shorter one admits too,
+    /// and signals that change seldom are fewer and often hurt more.
+    pub fn dwells(self) -> Vec<Span> {
+        let longer = (1..4).map(|part| Span::from_nanos(self.t_0.nanos() / 3i64.pow(part)));
+        longer.filter(|&longer| longer > self.dwell).chain([self.dwell]).collect()
+    }
+}
+
 /// A switching signal: which graph for how long, from zero to the end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Signal(Vec<Piece>);
@@ -152,22 +161,22 @@ impl Signals {
     }
 
     /// Periodic extremes over each of the connected graphs: losses of T_0, and of parts of it, as often as allowed, from
-    /// the start, from the end, and from half a loss on.
+    /// the start, from the end, from a loss at the start to one at the end, and from half a loss on.
     pub fn periodic_starts(&self) -> impl Iterator<Item = Signal> + '_ {
         let (t_0, dwell) = (self.allowance.t_0.nanos(), self.allowance.dwell.nanos());
         let losses = (0..PARTS).map(move |part| t_0 >> part).filter(move |&down| down >= dwell);
         let periodic =
             losses.flat_map(|down| (0..self.connected).map(move |weak| (down, weak))).flat_map(move |(down, weak)| {
-                let nothing = Piece { graph: self.nothing(), lasts: down };
-                let turn = [nothing, Piece { graph: weak, lasts: self.recovery(down) }];
-                let turns = (self.end.nanos() / (turn[0].lasts + turn[1].lasts)) as usize + 2;
-                let all: Vec<Piece> = turn.iter().copied().cycle().take(2 * turns).collect();
-                let mut half = all.clone();
+                let up = self.recovery(down);
+                let (shorter_losses, longer_stays) = self.fitted(down, up);
+                let early = self.turns(down, up, weak);
+                let mut half = early.clone();
                 half[0].lasts = (down / 2).max(dwell);
-                let backwards = all.iter().rev().copied().collect();
                 [
-                    self.settled(all, weak, false),
-                    self.settled_backwards(backwards, weak, false),
+                    self.settled(early.clone(), weak, false),
+                    self.settled_backwards(early.into_iter().rev().collect(), weak, false),
+                    self.settled(self.turns(shorter_losses.0, shorter_losses.1, weak), weak, false),
+                    self.settled(self.turns(longer_stays.0, longer_stays.1, weak), weak, false),
                     self.settled(half, weak, false),
                 ]
             });
@@ -176,12 +185,30 @@ impl Signals {
         periodic.chain(none.into_iter().flatten())
     }
 
+    /// Losses and stays by turns, beyond the end; an even number of them, a loss first.
+    fn turns(&self, down: i64, up: i64, weak: usize) -> Vec<Piece> {
+        let turn = [Piece { graph: self.nothing(), lasts: down }, Piece { graph: weak, lasts: up }];
+        let turns = (self.end.nanos() / (down + up).max(1)) as usize + 2;
+        turn.iter().copied().cycle().take(2 * turns).collect()
+    }
+
+    /// Losses and stays (down, up) that begin and end with a whole loss: with shorter losses, and with longer stays.
+    fn fitted(&self, down: i64, up: i64) -> ((i64, i64), (i64, i64)) {
+        let (end, turn) = (self.end.nanos(), down + up);
+        // n losses and n − 1 stays.
+        let most = (end + up) / turn;
+        let longer = if most > 1 { (end - most * down + most - 2) / (most - 1) } else { up };
+        let more = (end + up + turn - 1) / turn;
+        let share = end as f64 / (more * down + (more - 1) * up).max(1) as f64;
+        let shorter = ((down as f64 * share).floor() as i64).max(1);
+        ((shorter, self.recovery(shorter)), (down, longer))
+    }
+
     /// Random losses such as a mission can ask for, of this number: with the dwell time, and with longer ones by turns.
     pub fn random_start(&self, number: usize, seed: u64) -> Signal {
-        let Allowance { alpha, t_0, dwell } = self.allowance;
-        let longer = std::iter::successors(Some(dwell), |&longer| Some(longer * 3)).take_while(|&d| d * 2 <= t_0);
-        let dwells: Vec<Span> = longer.take(PARTS).collect();
-        let dwell = dwells.get(number % dwells.len().max(1)).copied().unwrap_or(dwell);
+        let Allowance { alpha, t_0, .. } = self.allowance;
+        let dwells = self.allowance.dwells();
+        let dwell = dwells[number % dwells.len()];
         let mut stream = Stream::new(seed, &format!("adversary/graph/{number}"));
         let mut losses =
             Switching::random(1, alpha, t_0, dwell, Stream::new(seed, &format!("adversary/random/{number}")));
@@ -289,7 +316,7 @@ impl Signals {
     }
 }
 
-/// Periodic losses last T_0 over powers of two below this one; as many dwell times are tried for random ones.
+/// Periodic losses last T_0, half of it, and so on: so many lengths.
 const PARTS: usize = 5;
 
 /// A signal on the way from the start to the end.
@@ -497,6 +524,19 @@ mod tests {
         let last = signals.intervals(late).last().expect("some stay").to;
         assert_eq!(last, Time::from_secs(98.0 - 7.5));
         assert!(signals.admits(late));
+    }
+
+    #[test]
+    fn losses_at_the_start_and_the_end_fit_in_more_than_whole_periods() {
+        // 120 s are twelve periods of 10 s, the last with a stay; from loss to loss 12 of 7.5 s or 13 shorter ones fit.
+        let signals = signals(&STAR, allowance(0.75, 7.5, 2.0), 120.0);
+        let starts: Vec<_> = signals.periodic_starts().take(4).collect();
+        let stays = [0, 2, 3].map(|start: usize| signals.intervals(&starts[start]));
+        assert_eq!(stays.each_ref().map(Vec::len), [12, 12, 11]);
+        let lost = [0, 2, 3].map(|start: usize| measured(&signals, &STAR, &starts[start], 120.0).loss_time().secs());
+        let loss = 120.0 / (13.0 + 12.0 / 3.0);
+        assert!((lost[0] - 90.0).abs() < 1e-6 && (lost[2] - 90.0).abs() < 1e-6, "{lost:?}");
+        assert!((lost[1] - 13.0 * loss).abs() < 1e-6, "{lost:?}");
     }
 
     #[test]
