@@ -206,7 +206,10 @@ enum What {
     /// Search the worst switching signal that brief connectivity losses admit, and save the mission with it
     #[command(
         after_help = "A signal is admitted if in every window of length t the vehicles are not connected for at most\n\
-        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3).\n\n\
+        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3).\n\
+        Half of the flights go to signals to begin with: the mission's own if it is admitted, periodic extremes and random\n\
+        losses; the rest to changes of the worst. What is found is no milder than any that was flown; that there is no\n\
+        worse one is not shown.\n\n\
         Example:\n  mission-control worst missions/talk/naive.toml --alpha 0.5 --t0 5 --dwell 1\n\n\
         Exit codes: 0 found, 2 a wrong mission or number, 4 output cannot be written."
     )]
