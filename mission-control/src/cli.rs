@@ -206,7 +206,10 @@ enum What {
     /// Search the worst switching signal that brief connectivity losses admit, and save the mission with it
     #[command(
         after_help = "A signal is admitted if in every window of length t the vehicles are not connected for at most\n\
-        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3).\n\n\
+        alpha t + (1 - alpha) T_0, and the network changes no faster than the dwell time (Definition 4.3).\n\
+        Half of the flights go to signals to begin with: the mission's own if it is admitted, periodic extremes and random\n\
+        losses; the rest to changes of the worst. What is found is no milder than any that was flown; that there is no\n\
+        worse one is not shown.\n\n\
         Example:\n  mission-control worst missions/talk/naive.toml --alpha 0.5 --t0 5 --dwell 1\n\n\
         Exit codes: 0 found, 2 a wrong mission or number, 4 output cannot be written."
     )]
@@ -263,7 +266,7 @@ struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 struct WorstArgs {
-    /// The mission file; its own switching is left aside
+    /// The mission file; if its own switching is admitted, the search begins with it
     mission: PathBuf,
     /// Share of the time that may be lost in the long run, 0 to below 1
     #[arg(long, allow_negative_numbers = true)]
@@ -805,7 +808,12 @@ fn search(args: &WorstArgs) -> Ended {
     bus::tell!("{}: coordination error {when} ({} flights of {})", mission.name, found.flights, mission.end);
     bus::tell!("  at the start          {:.4e}", found.initial);
     bus::tell!("  as the mission is     {:.4e}", found.as_written);
-    bus::tell!("  worst signal found    {:.4e}, a decay at {:.5} 1/s", found.worst, found.rate);
+    let decay = match found.rate {
+        rate if rate.is_finite() => format!("a decay at {rate:.5} 1/s"),
+        f64::INFINITY => "no error is left at the end".to_string(),
+        _ => "there is no error at the start that could decay".to_string(),
+    };
+    bus::tell!("  worst signal found    {:.4e}, {decay}", found.worst);
     match (found.bound, found.guaranteed_rate, found.statement) {
         (Some(bound), Some(rate), Some(statement)) => {
             let beyond = match found.within {
@@ -815,10 +823,11 @@ fn search(args: &WorstArgs) -> Ended {
                 }
                 _ => "",
             };
-            bus::tell!(
-                "  {statement} allows {bound:.4e} {when}, a decay at {rate:.5} 1/s: {:.3} times the worst found{beyond}",
-                bound / found.worst
-            );
+            let times = match found.worst > 0.0 {
+                true => format!("{:.3} times the worst found", bound / found.worst),
+                false => "none was found".to_string(),
+            };
+            bus::tell!("  {statement} allows {bound:.4e} {when}, a decay at {rate:.5} 1/s: {times}{beyond}");
         }
         _ => bus::tell!("  no theorem bounds it: {}", found.no_bound.as_deref().unwrap_or("none speaks of it")),
     }

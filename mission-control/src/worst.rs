@@ -163,7 +163,9 @@ pub fn worst(
     let id = |i: usize| mission.vehicles[i].id.clone();
     let links = mission.links.iter().map(|link| [id(link.from), id(link.to)]).collect();
     let arcs: Vec<(usize, usize)> = mission.links.iter().map(|link| (link.to, link.from)).collect();
-    let signals = Signals::new(mission.vehicles.len(), &arcs, quest.allowance, mission.end)?;
+    let mut signals = Signals::new(mission.vehicles.len(), &arcs, quest.allowance, mission.end)?;
+    let own = signals.given(mission.switching.clone());
+    let starts = starts(&signals, own, quest);
     let Allowance { alpha, t_0, dwell } = quest.allowance;
     let allowed = format!("α = {alpha}, T₀ = {t_0} and a dwell time of {dwell}");
     let space = if file.about.is_empty() { "" } else { " " };
@@ -175,7 +177,7 @@ pub fn worst(
     let flown = AtomicUsize::new(0);
     let results: Vec<Result<(f64, Signal), String>> = std::thread::scope(|scope| {
         let chain = |number: usize| {
-            let (signals, rewriter, flown, progress) = (&signals, &rewriter, &flown, &progress);
+            let (signals, starts, rewriter, flown, progress) = (&signals, &starts, &rewriter, &flown, &progress);
             scope.spawn(move || {
                 let hurts = |signal: &Signal| {
                     let errors = fly(&rewriter.text(signals, signal)?)?;
@@ -184,7 +186,8 @@ pub fn worst(
                 };
                 let stream = Stream::new(quest.seed, &format!("worst/{number}"));
                 let more = usize::from(number < quest.flights % chains);
-                climb(signals, number, chains, quest.flights / chains + more, stream, hurts)
+                let own_starts = starts.iter().skip(number).step_by(chains);
+                climb(signals, own_starts, quest.flights / chains + more, stream, hurts)
             })
         };
         let threads: Vec<_> = (0..chains).map(chain).collect();
@@ -239,44 +242,64 @@ pub fn worst(
 /// Searches that go on side by side: a fixed number, so that what is found does not depend on the machine.
 const CHAINS: usize = 4;
 
-/// Climbs from this chain's share of the starts: takes every change that hurts no less.
-fn climb(
+/// Signals to begin with, no more than half of the flights (but one): the mission's own if it is admitted, then periodic
+/// extremes and random ones by turns.
+fn starts(signals: &Signals, own: Option<Signal>, quest: &Quest) -> Vec<Signal> {
+    let mut periodic = signals.periodic_starts();
+    let random = (0..).flat_map(|number| {
+        let random = signals.random_start(number, quest.seed);
+        periodic.next().into_iter().chain([random])
+    });
+    let admitted = random.filter(|signal| signals.admits(signal));
+    own.into_iter().chain(admitted).take((quest.flights / 2).max(CHAINS)).collect()
+}
+
+/// Flies the starts, then climbs from the worst of them: takes every change that hurts no less. With each dwell time it
+/// spends half of the flights that are left, and begins with the worst so far that keeps it.
+///
+/// What it returns hurts no less than anything it has flown.
+fn climb<'a>(
     signals: &Signals,
-    number: usize,
-    chains: usize,
+    starts: impl Iterator<Item = &'a Signal>,
     flights: usize,
     mut stream: Stream,
     hurts: impl Fn(&Signal) -> Result<f64, String>,
 ) -> Result<(f64, Signal), String> {
-    let starts = signals.starts();
-    let mut best: Option<(f64, Signal)> = None;
     let mut left = flights.max(1);
-    for start in starts.iter().cycle().skip(number % starts.len()).step_by(chains).take(starts.len().div_ceil(chains)) {
-        if left == 0 {
-            break;
-        }
+    let mut flown: Vec<(f64, Signal)> = Vec::new();
+    for start in starts.take(left) {
         left -= 1;
-        let value = hurts(start)?;
-        if best.as_ref().is_none_or(|best| value > best.0) {
-            best = Some((value, start.clone()));
-        }
+        flown.push((hurts(start)?, start.clone()));
     }
-    let mut best = best.ok_or("the search has no start")?;
-    // A change that changes nothing is no flight; where almost nothing can change, the search ends early.
-    let mut idle = 0;
-    while left > 0 && idle < MOST_IDLE {
-        let other = signals.changed(&best.1, &mut stream);
-        if other == best.1 {
-            idle += 1;
+    let dwells = signals.allowance().dwells();
+    for (stage, &dwell) in dwells.iter().enumerate() {
+        let signals = signals.with_dwell(dwell);
+        let mut spend = if stage + 1 < dwells.len() { left / 2 } else { left };
+        let Some(mut best) = most_hurting(flown.iter().filter(|(_, signal)| signals.admits(signal))).cloned() else {
             continue;
+        };
+        // A change that changes nothing is no flight; where almost nothing can change, the search ends early.
+        let mut idle = 0;
+        while spend > 0 && idle < MOST_IDLE {
+            let other = signals.changed(&best.1, &mut stream);
+            if other == best.1 || !signals.admits(&other) {
+                idle += 1;
+                continue;
+            }
+            (idle, spend, left) = (0, spend - 1, left - 1);
+            let value = hurts(&other)?;
+            if value >= best.0 {
+                best = (value, other);
+            }
         }
-        (idle, left) = (0, left - 1);
-        let value = hurts(&other)?;
-        if value >= best.0 {
-            best = (value, other);
-        }
+        flown.push(best);
     }
-    Ok(best)
+    most_hurting(flown.iter()).cloned().ok_or_else(|| "the search has no start".to_string())
+}
+
+/// The first of those that hurt most.
+fn most_hurting<'a>(flown: impl Iterator<Item = &'a (f64, Signal)>) -> Option<&'a (f64, Signal)> {
+    flown.reduce(|most, other| if other.0 > most.0 { other } else { most })
 }
 
 /// So many changes in a row may change nothing.
@@ -336,6 +359,44 @@ mod tests {
         let arcs: Vec<(usize, usize)> = saved.links.iter().map(|link| (link.to, link.from)).collect();
         let planned = Connectivity::planned(saved.switching.clone(), saved.vehicles.len(), &arcs, saved.end);
         assert!(planned.t_0(0.75).secs() <= 15.0 + 1e-6, "{}", planned.t_0(0.75));
+    }
+
+    /// A brief flight, long enough for a few losses.
+    fn brief() -> Mission {
+        mission(&BRIEF_LOSSES.replace("duration_s = 120.0", "duration_s = 40.0"))
+    }
+
+    fn found(mission: &Mission, (alpha, t_0, dwell): (f64, f64, f64), flights: usize) -> super::Worst {
+        let folder = tempfile::tempdir().expect("a folder");
+        let quest = Quest { allowance: allowance(alpha, t_0, dwell), hurt: Hurt::End, flights, seed: 1 };
+        worst(mission, &quest, "m.toml", &folder.path().join("m.toml"), |_| {}).expect("found")
+    }
+
+    #[test]
+    fn a_smaller_dwell_time_admits_more_and_hurts_no_less() {
+        let found = [2.5, 0.5].map(|dwell| found(&brief(), (0.75, 7.5, dwell), 40).worst);
+        assert!(found[1] >= found[0], "{found:?}");
+    }
+
+    #[test]
+    fn nothing_milder_than_the_signal_of_the_mission_is_found_even_in_one_flight() {
+        for dwell in [2.5, 0.3] {
+            let found = found(&brief(), (0.75, 7.5, dwell), 1);
+            assert!(found.worst >= found.as_written && found.flights == 1, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_found_hurts_no_less_than_random_losses() {
+        let periodic = "periodic = { period_s = 10.0, up_from_s = 7.5, up_for_s = 2.5 }";
+        assert!(BRIEF_LOSSES.contains(periodic));
+        let random = brief().text.replace(periodic, "random = { alpha = 0.75, t_0_s = 7.5, dwell_s = 0.5 }");
+        let found = found(&brief(), (0.75, 7.5, 0.5), 40).worst;
+        for seed in 11..21 {
+            let random = random.replace("seed = 1\n", &format!("seed = {seed}\n"));
+            let errors = super::fly(&random).expect("flown");
+            assert!(errors.end <= found, "seed {seed}: {} {found}", errors.end);
+        }
     }
 
     #[test]
