@@ -21,7 +21,7 @@ pub(super) struct Decay {
 
 impl Decay {
     /// The decay in a recording with these coordination states.
-    pub fn of(coordination: &Coordination, exact: &[Record], facts: &Facts) -> Decay {
+    pub(super) fn of(coordination: &Coordination, exact: &[Record], facts: &Facts) -> Decay {
         let from_s = last_change(&speeds(exact), facts.duration_s);
         let disturbance = coordination.disturbance.as_deref();
         let fit = fit_coordination(&coordination.t_s, &coordination.norm(), disturbance, from_s, facts.link_period_s);

@@ -123,7 +123,10 @@ impl View<'_> {
                 line.with_color(colour(1)).with_stroke_width(1.8).with_dashed().with_legend(name)
             });
         }
-        let promised = points.iter().find(|point| point.0 >= self.decay.from_s - 1e-9);
+        // A rate without a factor is a slope: it lies where it can be laid beside the fitted one.
+        let slope_alone = self.facts.guaranteed_factor.is_none();
+        let from_s = self.decay.fit.filter(|_| slope_alone).map_or(self.decay.from_s, |fit| fit.from_s);
+        let promised = points.iter().find(|point| point.0 >= from_s - 1e-9);
         let guaranteed = self.facts.guaranteed_rate.filter(|rate| *rate > 0.0);
         if let Some(((start, height), rate)) = promised.copied().zip(guaranteed) {
             let factor = self.facts.guaranteed_factor.unwrap_or(1.0);
@@ -145,6 +148,9 @@ impl View<'_> {
             caption += &format!(" (dashed: {})", fitted_where(fit));
         }
         caption += ".";
+        if slope_alone && guaranteed.is_some() {
+            caption += " Of the dotted line only the slope is guaranteed, not the height.";
+        }
         if self.decay.fit.is_some_and(|fit| !fit.on_paths) {
             caption += " It was fitted on the way to the paths: d lasts as long as e.";
         }
@@ -356,12 +362,15 @@ mod tests {
 
     #[test]
     fn the_promise_is_drawn_from_the_last_change_of_speed_on() {
-        let start = |recording: &Recording| {
-            let drawn = figures(recording, &facts(true)).pop().expect("drawn").svg;
+        let start = |recording: &Recording, guaranteed_factor| {
+            let facts = Facts { guaranteed_factor, ..facts(true) };
+            let drawn = figures(recording, &facts).pop().expect("drawn").svg;
             ends_of(&drawn, PLANNED, "stroke-dasharray")[0]
         };
-        let (whole, changed) = (start(&fleet(true)), start(&changing()));
+        let (whole, changed) = (start(&fleet(true), Some(1.3)), start(&changing(), Some(1.3)));
         assert!(changed > whole + 100.0, "{whole} {changed}");
+        // Without a factor there is no height to start from: the slope is laid where the fit begins.
+        assert!(start(&changing(), None) > changed + 1.0, "{changed}");
     }
 
     #[test]
