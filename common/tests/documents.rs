@@ -6,8 +6,17 @@ use std::path::{Path, PathBuf};
 
 /// Files that the reader makes.
 const MADE_BY_THE_READER: [&str; 1] = ["missions/two-abreast.toml"];
-/// Files that the programs write into a run folder.
-const WRITTEN: [&str; 5] = ["summary.json", "theory.json", "clock.json", "report.html", "rate.svg"];
+/// Files that the programs write, most of them into a run folder.
+const WRITTEN: [&str; 8] = [
+    "mission.toml",
+    "host.json",
+    "summary.json",
+    "theory.json",
+    "clock.json",
+    "report.html",
+    "rate.svg",
+    "network.toml",
+];
 /// What a path to a file of ours ends with.
 const ENDINGS: [&str; 6] = ["rs", "toml", "md", "svg", "json", "html"];
 /// What is built or flown is not ours.

@@ -101,6 +101,28 @@ fn a_terminal_gets_a_bar_and_a_pipe_plain_lines() {
 }
 
 #[test]
+fn the_help_of_every_program_has_an_example() {
+    for name in ["mission-control", "network-emulator", "vehicle-node"] {
+        let output = Command::new(program(name)).arg("--help").output().expect("starts");
+        let help = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(help.contains("mission-control run missions/auv-helix.toml"), "{name}: {help}");
+        assert!(name == "mission-control" || help.contains("Example, one terminal each:"), "{name}: {help}");
+    }
+}
+
+#[test]
+fn a_mission_behind_attach_is_no_endpoint_and_the_way_out_is_told() {
+    let ground = Ground::new();
+    let mut wrong = ground.control(&["run", "--attach", "missions/auv-helix.toml"]);
+    wrong.ends_with(2);
+    let said = wrong.stderr();
+    assert!(said.contains("mission-control run MISSION --attach") && said.contains("--attach=tcp/HOST:PORT"), "{said}");
+    let mut wrong = ground.control(&["run", "mission.toml", "--attach", "tcp/nowhere"]);
+    wrong.ends_with(2);
+    assert!(wrong.stderr().contains("it has no port") && !wrong.stderr().contains("MISSION --attach"));
+}
+
+#[test]
 fn the_help_of_each_command_has_an_example_and_its_exit_codes() {
     let ground = Ground::new();
     let help = ground.controlled(0, &["--help"]);
@@ -166,6 +188,10 @@ fn diff_recover_and_export_take_what_is_there() {
 
     let said = ground.controlled(0, &["recover", "cut.mcap"]);
     assert!(said.ends_with(" rows to cut-recovered.mcap\n") && !said.starts_with('0'), "{said}");
+    let mut again = ground.control(&["recover", "cut.mcap"]);
+    again.ends_with(4);
+    let said = again.stderr();
+    assert!(said.contains("cut-recovered.mcap is there already") && said.contains("--out FILE"), "{said}");
     let recovered = bus::recording::read(ground.path("cut-recovered.mcap")).expect("a recording");
     assert!(recovered.complete && !recovered.exact.is_empty());
     let said = ground.controlled(1, &["diff", "a", "cut-recovered.mcap"]);
