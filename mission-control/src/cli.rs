@@ -245,7 +245,7 @@ struct RunArgs {
     out: Option<PathBuf>,
     /// Fly with a fleet that is already up, at this endpoint (default: tcp/127.0.0.1:7447). One run at a time conducts it:
     /// another is queued for 2.5 s and flies if its turn comes, else it gives up
-    #[arg(long, value_name = "tcp/HOST:PORT", num_args = 0..=1, default_missing_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH")]
+    #[arg(long, value_name = "tcp/HOST:PORT", num_args = 0..=1, default_missing_value = "tcp/127.0.0.1:7447", env = "CPF_ATTACH", value_parser = attached)]
     attach: Option<Endpoint>,
     /// Where the own network-emulator listens (default: tcp/127.0.0.1:7447, or a free port if that is taken)
     #[arg(long, value_name = "tcp/HOST:PORT", conflicts_with = "attach")]
@@ -262,6 +262,18 @@ struct RunArgs {
     /// JSON for a pipe
     #[arg(long)]
     json: bool,
+}
+
+/// An endpoint after `--attach`, which takes one or none: what follows it may be meant as the mission.
+fn attached(text: &str) -> Result<Endpoint, String> {
+    let hint = || match Path::new(text).extension() {
+        Some(ending) if ending == "toml" => {
+            "; the endpoint after --attach may be left out, and a mission then comes before it: \
+                                             mission-control run MISSION --attach, or --attach=tcp/HOST:PORT MISSION"
+        }
+        _ => "",
+    };
+    text.parse().map_err(|error| format!("{error}{}", hint()))
 }
 
 #[derive(Debug, clap::Args)]
@@ -843,6 +855,11 @@ fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         path.with_file_name(format!("{stem}-recovered.mcap"))
     });
+    // What is there may be all that is left: it is never overwritten.
+    if out.exists() {
+        let text = "is there already and is not overwritten: move it away, or say --out FILE with another name";
+        return Err(End(4, format!("{} {text}", out.display())));
+    }
     let recovered = bus::recording::recover(path, &out).map_err(|error| End(4, error.to_string()))?;
     if recovered.rows == 0 {
         return Err(End(4, format!("{} holds no row that could be saved", path.display())));

@@ -47,7 +47,13 @@ const OVERRUN_PERIOD: Duration = Duration::from_secs(1);
 ///
 /// Exit codes: 0 ended as asked, 2 wrong use, 3 cannot listen, 4 no logs can be kept, or recording failed.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "network-emulator", version)]
+#[command(
+    name = "network-emulator",
+    version,
+    after_help = "Example, one terminal each:\n  \
+    network-emulator --listen tcp/127.0.0.1:7447\n  vehicle-node --id auv1\n  vehicle-node --id auv2\n  vehicle-node --id auv3\n  \
+    mission-control run missions/auv-helix.toml --attach"
+)]
 pub struct Args {
     /// Where vehicles and mission-control connect; port 0 takes a free one
     #[arg(long, value_name = "tcp/HOST:PORT", default_value = "tcp/127.0.0.1:7447", env = "CPF_LISTEN")]

@@ -1,6 +1,7 @@
 //! The commands of mission-control at a terminal and in a pipe: what they say, to which stream, with which exit code.
 
 use std::fs::{self, OpenOptions};
+use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -88,7 +89,8 @@ fn a_terminal_gets_a_bar_and_a_pipe_plain_lines() {
     let command = format!("{} simulate mission.toml --out shown", program("mission-control").display());
     let mut script = Command::new("script");
     if Command::new("script").arg("--version").output().is_err() {
-        println!("skipped: script(1) is not installed");
+        // Past the test harness, which shows the output of failed tests only.
+        let _ = writeln!(std::io::stderr(), "commands: skipped: script(1) is not installed");
         return;
     }
     let mut shown = ground.start("script", script.args(["-qec", &command, "typescript"]).env("TERM", "xterm"));
@@ -96,6 +98,28 @@ fn a_terminal_gets_a_bar_and_a_pipe_plain_lines() {
     let said = fs::read_to_string(ground.path("typescript")).expect("a typescript");
     assert!(said.contains('\u{1b}') && said.contains("simulating [") && said.contains('%'), "{said:?}");
     assert!(!said.contains("simulating: "), "{said:?}");
+}
+
+#[test]
+fn the_help_of_every_program_has_an_example() {
+    for name in ["mission-control", "network-emulator", "vehicle-node"] {
+        let output = Command::new(program(name)).arg("--help").output().expect("starts");
+        let help = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(help.contains("mission-control run missions/auv-helix.toml"), "{name}: {help}");
+        assert!(name == "mission-control" || help.contains("Example, one terminal each:"), "{name}: {help}");
+    }
+}
+
+#[test]
+fn a_mission_behind_attach_is_no_endpoint_and_the_way_out_is_told() {
+    let ground = Ground::new();
+    let mut wrong = ground.control(&["run", "--attach", "missions/auv-helix.toml"]);
+    wrong.ends_with(2);
+    let said = wrong.stderr();
+    assert!(said.contains("mission-control run MISSION --attach") && said.contains("--attach=tcp/HOST:PORT"), "{said}");
+    let mut wrong = ground.control(&["run", "mission.toml", "--attach", "tcp/nowhere"]);
+    wrong.ends_with(2);
+    assert!(wrong.stderr().contains("it has no port") && !wrong.stderr().contains("MISSION --attach"));
 }
 
 #[test]
@@ -164,6 +188,10 @@ fn diff_recover_and_export_take_what_is_there() {
 
     let said = ground.controlled(0, &["recover", "cut.mcap"]);
     assert!(said.ends_with(" rows to cut-recovered.mcap\n") && !said.starts_with('0'), "{said}");
+    let mut again = ground.control(&["recover", "cut.mcap"]);
+    again.ends_with(4);
+    let said = again.stderr();
+    assert!(said.contains("cut-recovered.mcap is there already") && said.contains("--out FILE"), "{said}");
     let recovered = bus::recording::read(ground.path("cut-recovered.mcap")).expect("a recording");
     assert!(recovered.complete && !recovered.exact.is_empty());
     let said = ground.controlled(1, &["diff", "a", "cut-recovered.mcap"]);
@@ -306,7 +334,8 @@ fn the_rows_that_the_readme_counts_are_there() {
 fn the_python_of_the_readme_prints_what_it_says() {
     let python = |arguments: &[&str]| Command::new("python3").args(arguments).output();
     if !python(&["--version"]).is_ok_and(|output| output.status.success()) {
-        println!("skipped: python3 is not installed");
+        // Past the test harness, which shows the output of failed tests only.
+        let _ = writeln!(std::io::stderr(), "commands: skipped: python3 is not installed");
         return;
     }
     let ground = Ground::new();
@@ -325,7 +354,11 @@ fn the_python_of_the_readme_prints_what_it_says() {
     let by_csv = says(snippet("python", "csv.DictReader"));
     assert!(by_csv.starts_with("800.0 338.186"), "{by_csv}");
     if !python(&["-c", "import mcap"]).is_ok_and(|output| output.status.success()) {
-        println!("skipped in part: the python package mcap is not installed (pip install mcap)");
+        // Past the test harness, which shows the output of failed tests only.
+        let _ = writeln!(
+            std::io::stderr(),
+            "commands: skipped in part: the python package mcap is not installed (pip install mcap)"
+        );
         return;
     }
     let by_mcap = says(snippet("python", "make_reader"));

@@ -1,4 +1,4 @@
-//! What a vehicle differs by from those it hears.
+//! What a vehicle differs by from those it hears: ξ_i − ξ_j, on lines (1.1) and on circles, where ξ = s/R (1.2).
 
 use super::{Neighbour, Own};
 

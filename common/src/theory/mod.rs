@@ -96,7 +96,8 @@ pub enum PathFollowing {
 /// ρ_1 = (m/4)(|p'|²/(k_e(1 − λ_1m/(2k_e))) + b²/(k_φ(1 − λ_1m/(2k_φ)))),    α_1 = ½ min(1, least m², least j)
 /// ```
 ///
-/// and as little as one likes of the first bears δ. λ_1 is chosen to make ρ_1/(α_1λ_1) small.
+/// and as little as one likes of the first bears δ. (4.54) is printed with |v~_r| where this has its square, as Assumption 4.1 does.
+/// λ_1 is chosen to make ρ_1/(α_1λ_1) small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Underactuated {
     /// Smallest and largest entry of M \[t\].

@@ -6,6 +6,8 @@
 //! | u = −aη − bCLξ (3.83), C = cI | λ² + aλ + bc²μ = 0 | a²/b > c² Im²μ/Re μ (3.85) |
 //! | F = −aC⁻¹LCv − bC⁻¹Lξ (3.92) | λ² + aμλ + bμ = 0 | a²/b > Im²μ/(Re μ \|μ\|²) (3.93) |
 //!
+//! The last is that of (3.94), the closed loop of (3.92).
+//!
 //! They are sharp: by Routh's criterion for complex coefficients, λ² + pλ + q is stable iff Re p > 0 and
 //! (Re p)² Re q + Re p Im p Im q > (Im q)². On the border a pair of roots is on the imaginary axis.
 //!

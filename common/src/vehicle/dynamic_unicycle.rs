@@ -1,4 +1,4 @@
-//! The wheeled robot of section 3.2.1: a unicycle driven by a force and a torque.
+//! The wheeled robot of section 3.2.1, in chapter 2 (2.1), (2.2): a unicycle driven by a force and a torque.
 
 use nalgebra::SVector;
 

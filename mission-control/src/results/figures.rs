@@ -15,12 +15,13 @@ use kuva::plot::annotations::ShadedRegion;
 use kuva::render::layout::Layout;
 
 use super::Facts;
+use super::decay::{Decay, fitted_where};
 use super::drawing::{
     Drawing, OUTAGE, OUTAGE_LIMIT, PAPER, PLANNED, Panel, SAMPLES, colour, extremes, render, subscript,
 };
 use super::network::Network;
+use super::report::number;
 use super::series::{Coordination, Track, tracks, unbroken};
-use super::statistics::fit_exponential;
 use super::summary::thinned;
 
 /// One figure.
@@ -39,7 +40,8 @@ pub fn figures(recording: &Recording, facts: &Facts) -> Vec<Figure> {
     let tracks = tracks(&recording.exact, facts);
     let coordination = Coordination::of(&tracks, facts);
     let outages = Network::of(&recording.exact, facts).blackouts();
-    let view = View { facts, tracks, coordination, outages };
+    let decay = Decay::of(&coordination, &recording.exact, facts);
+    let view = View { facts, tracks, coordination, decay, outages };
     let mut figures = if facts.spatial { view.spatial() } else { view.planar() };
     figures.extend(view.rate());
     figures
@@ -50,7 +52,15 @@ struct View<'a> {
     facts: &'a Facts,
     tracks: Vec<Track<'a>>,
     coordination: Coordination,
+    decay: Decay,
     outages: Vec<(f64, f64)>,
+}
+
+/// ±height·exp(−rate·(t − start)) from its start on.
+struct Envelope {
+    start_s: f64,
+    height: f64,
+    rate: f64,
 }
 
 impl View<'_> {
@@ -96,7 +106,6 @@ impl View<'_> {
         if self.coordination.states.len() < 2 || points.len() < 2 {
             return None;
         }
-        let (start, height) = points[0];
         let end = points[points.len() - 1].0;
         let lowest = points.iter().fold(f64::INFINITY, |low, point| low.min(point.1));
         let mut panel = Panel::default();
@@ -104,23 +113,27 @@ impl View<'_> {
             .into_iter()
             .map(|part| part.map(|at| (t_s[at], norm[at])).filter(|point| point.1 > 0.0).collect());
         broken(&mut panel, parts.collect(), 0, "measured");
-        let fit = fit_exponential(t_s, &norm, self.facts.link_period_s);
-        if let Some(fit) = fit {
+        if let Some(fit) = self.decay.fit {
             let at = t_s.partition_point(|time| *time < fit.from_s).min(norm.len() - 1);
             let value = |time: f64| (time, norm[at] * (-fit.rate * (time - fit.from_s)).exp());
-            let name = format!("fitted: {:.3} /s", fit.rate);
+            let way = if fit.on_paths { "" } else { " on the way to the paths" };
+            let name = format!("fitted{way}: {} /s", in_a_picture(fit.rate));
             panel.names.push(name.clone());
             panel.line(vec![value(fit.from_s), value(fit.to_s)], |line| {
                 line.with_color(colour(1)).with_stroke_width(1.8).with_dashed().with_legend(name)
             });
         }
-        if let Some(rate) = self.facts.guaranteed_rate.filter(|rate| *rate > 0.0) {
+        // A rate without a factor is a slope: it lies where it can be laid beside the fitted one.
+        let slope_alone = self.facts.guaranteed_factor.is_none();
+        let from_s = self.decay.fit.filter(|_| slope_alone).map_or(self.decay.from_s, |fit| fit.from_s);
+        let promised = points.iter().find(|point| point.0 >= from_s - 1e-9);
+        let guaranteed = self.facts.guaranteed_rate.filter(|rate| *rate > 0.0);
+        if let Some(((start, height), rate)) = promised.copied().zip(guaranteed) {
             let factor = self.facts.guaranteed_factor.unwrap_or(1.0);
             // Not further down than the measurement goes: the axis is for what was measured.
             let until = end.min(start + (factor * height / lowest).ln() / rate);
             let value = |time: f64| (time, factor * height * (-rate * (time - start)).exp());
-            let name =
-                if rate < 0.01 { format!("guaranteed: {rate:.5} /s") } else { format!("guaranteed: {rate:.3} /s") };
+            let name = format!("guaranteed: {} /s", in_a_picture(rate));
             panel.names.push(name.clone());
             panel.line(vec![value(start), value(until)], |line| {
                 line.with_color(PLANNED).with_stroke_width(1.8).with_dotted().with_legend(name)
@@ -129,8 +142,19 @@ impl View<'_> {
         let unit = if self.facts.xi_unit.is_empty() { String::new() } else { format!(" [{}]", self.facts.xi_unit) };
         let layout = panel.layout("Decay of the coordination error", "time [s]", &format!("‖x − mean(x)‖{unit}"));
         let layout = self.time_axis(layout).with_log_y();
-        let caption = "Norm of the coordination error on a logarithmic scale: a straight line is an exponential.";
-        Some(Figure { name: "rate", caption: caption.into(), svg: render("rate", 1, 1, vec![panel.laid_out(layout)]) })
+        let mut caption =
+            "Norm of the coordination error on a logarithmic scale: a straight line is an exponential".to_owned();
+        if let Some(fit) = &self.decay.fit {
+            caption += &format!(" (dashed: {})", fitted_where(fit));
+        }
+        caption += ".";
+        if slope_alone && guaranteed.is_some() {
+            caption += " Of the dotted line only the slope is guaranteed, not the height.";
+        }
+        if self.decay.fit.is_some_and(|fit| !fit.on_paths) {
+            caption += " It was fitted on the way to the paths: d lasts as long as e.";
+        }
+        Some(Figure { name: "rate", caption, svg: render("rate", 1, 1, vec![panel.laid_out(layout)]) })
     }
 
     /// What the caption has to say about the panel of the coordination errors.
@@ -152,11 +176,13 @@ impl View<'_> {
         (1..=OUTAGE_LIMIT).contains(&self.outages.len())
     }
 
-    /// Rate and height at t = 0 of the bound on |x_1 − x_j| ≤ √2·c·exp(−rate·t)·‖e(0)‖.
-    fn envelope(&self) -> Option<(f64, f64)> {
-        let first = *self.coordination.norm().first()?;
+    /// The bound on |x_1 − x_j| ≤ √2·c·exp(−rate·(t − t_0))·‖e(t_0)‖ from the instant t_0 on from which on it is promised.
+    fn envelope(&self) -> Option<Envelope> {
+        let t_s = &self.coordination.t_s;
+        let at = t_s.partition_point(|time| *time < self.decay.from_s - 1e-9);
+        let (start_s, first) = (*t_s.get(at)?, *self.coordination.norm().get(at)?);
         let height = std::f64::consts::SQRT_2 * self.facts.guaranteed_factor? * first;
-        Some((self.facts.guaranteed_rate?, height)).filter(|_| height > 0.0)
+        Some(Envelope { start_s, height, rate: self.facts.guaranteed_rate? }).filter(|envelope| envelope.height > 0.0)
     }
 
     fn plan_view(&self, title: &str) -> Drawing {
@@ -206,10 +232,11 @@ impl View<'_> {
                 .map(|part| part.map(|at| (t_s[at], states[0][at] - states[1][at])).collect());
             broken(&mut panel, parts.collect(), index + 1, &format!("{symbol}₁ − {symbol}{}", subscript(index + 2)));
         }
-        if let Some((rate, height)) = self.envelope() {
+        if let Some(Envelope { start_s, height, rate }) = self.envelope() {
             for sign in [1.0, -1.0] {
-                let at = |step: u32| self.facts.duration_s * f64::from(step) / 200.0;
-                let points = (0..=200).map(|step| (at(step), sign * height * (-rate * at(step)).exp())).collect();
+                let at = |step: u32| start_s + (self.facts.duration_s - start_s) * f64::from(step) / 200.0;
+                let value = |time: f64| (time, sign * height * (-rate * (time - start_s)).exp());
+                let points = (0..=200).map(|step| value(at(step))).collect();
                 panel.line(points, |line| line.with_color(PLANNED).with_stroke_width(1.2).with_dotted());
             }
         }
@@ -237,6 +264,12 @@ impl View<'_> {
             layout
         }
     }
+}
+
+/// A number as the report writes it, for a picture, which has no raised digits.
+fn in_a_picture(value: f64) -> String {
+    let text = number(value);
+    if text.contains('<') { format!("{value:.1e}") } else { text }
 }
 
 /// A line with gaps: what was not recorded is not drawn. What is no number cannot be drawn either.
@@ -268,7 +301,8 @@ mod tests {
     use crate::results::VehicleFacts;
     use crate::results::drawing::renumbered;
     use crate::results::testing::{facts, fleet, state_row};
-    use common::record::Record;
+    use crate::results::{fit_exponential, summarise};
+    use common::record::{Record, SpeedRow};
 
     #[test]
     fn planar_and_spatial_fleets_have_the_figures_of_the_thesis() {
@@ -287,6 +321,56 @@ mod tests {
         for text in ["time [s]", "‖e‖ [m]", "γ₁ − γ₃", "(b) Coordination errors"] {
             assert!(all[1].svg.contains(text), "{text}");
         }
+    }
+
+    /// A fleet whose speed changes at 200 s, when its error is small already, and is thrown apart again.
+    fn changing() -> Recording {
+        let mut recording = fleet(true);
+        recording.exact.push(Record::Speed(SpeedRow { t_ns: 200_000_000_000, speed: 0.6 }));
+        for record in &mut recording.exact {
+            let Record::State(row) = record else { continue };
+            let since_s = row.t_ns as f64 / 1e9 - 200.0;
+            if &*row.vehicle == "v1" && since_s >= 0.0 {
+                row.xi += 5.0 * (-0.07 * since_s).exp();
+            }
+        }
+        recording
+    }
+
+    /// The points of the line of this colour and dash in a picture, in its own units.
+    fn ends_of(svg: &str, stroke: &str, dash: &str) -> Vec<f64> {
+        let path = svg.split("<path").find(|path| path.contains(stroke) && path.contains(dash)).expect("the line");
+        let drawn = path.split(" d=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("its points");
+        let numbers = drawn.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-'));
+        numbers.filter_map(|number| number.parse().ok()).collect()
+    }
+
+    #[test]
+    fn the_rate_in_the_figure_is_that_of_the_summary() {
+        for recording in [fleet(true), changing()] {
+            let fit = summarise(&recording, &facts(true)).fleet.coordination.fit.expect("decays");
+            let drawn = figures(&recording, &facts(true)).pop().expect("drawn");
+            assert!(drawn.svg.contains(&format!("fitted: {} /s", number(fit.rate))), "{fit:?}");
+            let part = format!("(dashed: fitted from {} s to {} s)", number(fit.from_s), number(fit.to_s));
+            assert!(drawn.caption.contains(&part), "{part} / {}", drawn.caption);
+        }
+        let whole = Coordination::of(&tracks(&changing().exact, &facts(true)), &facts(true));
+        let whole = fit_exponential(&whole.t_s, &whole.norm(), Some(10.0)).expect("decays");
+        let fit = summarise(&changing(), &facts(true)).fleet.coordination.fit.expect("decays");
+        assert!(number(whole.rate) != number(fit.rate) && fit.from_s > 200.0, "{whole:?} {fit:?}");
+    }
+
+    #[test]
+    fn the_promise_is_drawn_from_the_last_change_of_speed_on() {
+        let start = |recording: &Recording, guaranteed_factor| {
+            let facts = Facts { guaranteed_factor, ..facts(true) };
+            let drawn = figures(recording, &facts).pop().expect("drawn").svg;
+            ends_of(&drawn, PLANNED, "stroke-dasharray")[0]
+        };
+        let (whole, changed) = (start(&fleet(true), Some(1.3)), start(&changing(), Some(1.3)));
+        assert!(changed > whole + 100.0, "{whole} {changed}");
+        // Without a factor there is no height to start from: the slope is laid where the fit begins.
+        assert!(start(&changing(), None) > changed + 1.0, "{changed}");
     }
 
     #[test]

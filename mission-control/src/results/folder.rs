@@ -170,7 +170,7 @@ mod tests {
             let (summary, _) =
                 write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");
             let drawn = fs::read_to_string(directory.path().join("figures/rate.svg")).expect("reads");
-            (summary.fleet.coordination.at_least_guaranteed, drawn.contains("guaranteed: 0.020 /s"))
+            (summary.fleet.coordination.at_least_guaranteed, drawn.contains("guaranteed: 0.02 /s"))
         };
         assert_eq!(write(Some((0.02, Some(2.0)))), (Some(true), true));
         assert_eq!(write(Some((0.03, None))).0, Some(false));

@@ -11,6 +11,7 @@
 //! | [`diff()`], [`compare()`] | *equal*, or the first row in which two runs part |
 
 mod chart;
+mod decay;
 mod diff;
 pub(crate) mod drawing;
 mod export;

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::decay::fitted_where;
 use super::drawing::{GRID, INK, PAPER};
 use super::graph::printed;
 use super::summary::PATH_THRESHOLD_M;
@@ -262,10 +263,9 @@ fn vehicles(page: &mut String, report: &Report<'_>) {
     let mut sentences = Vec::new();
     if let Some(fit) = coordination.fit {
         let mut sentence = format!(
-            "The norm of the coordination error decayed at {} per second (fitted from {} s to {} s)",
+            "The norm of the coordination error decayed at {} per second ({})",
             number(fit.rate),
-            number(fit.from_s),
-            number(fit.to_s)
+            fitted_where(&fit)
         );
         if let Some(guaranteed) = coordination.guaranteed_rate {
             let _ = write!(sentence, "; theory guarantees {}", number(guaranteed));

@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 
 use bus::recording::Recording;
-use common::record::{ClockRecord, Overrun, Record, SpeedRow, StateRow};
+use common::record::{ClockRecord, Overrun, Record, StateRow};
 use common::time::Time;
 use serde::Serialize;
 
 use super::Facts;
+use super::decay::Decay;
 use super::network::{Connectivity, LinkSummary, Network, Spread, links, transmissions};
 use super::punctuality::{ClockVerdict, verdict};
 use super::series::{Coordination, Track, speeds, tracks};
-use super::statistics::{ExponentialFit, FIT_PART, fit_coordination, largest, mean, rms, settling_time, steady_from};
+use super::statistics::{ExponentialFit, FIT_PART, largest, mean, rms, settling_time, steady_from};
 
 /// A fleet counts as coordinated when its largest difference stays below this \[units of ξ\].
 pub(super) const COORDINATION_THRESHOLD: f64 = 1e-2;
@@ -326,7 +327,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         connectivity: network.connectivity_heard(exact, facts),
         connectivity_before: first_absence.and_then(|at| network.until(at).connectivity_heard(exact, facts)),
         absences,
-        coordination: coordination_summary(&coordination, facts, last_change(&speeds(exact), facts.duration_s)),
+        coordination: coordination_summary(&coordination, facts, Decay::of(&coordination, exact, facts).fit),
     };
     let complete = recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);
     let mut known = facts.aborted.clone();
@@ -418,16 +419,13 @@ fn absences(tracks: &[Track<'_>], facts: &Facts) -> Vec<Absence> {
     absences
 }
 
-/// When the formation speed changed for the last time under way \[s\]; zero if it never did.
-fn last_change(speeds: &[&SpeedRow], end_s: f64) -> f64 {
-    let changes = speeds.windows(2).filter(|pair| pair[0].speed != pair[1].speed);
-    changes.map(|pair| pair[1].t_ns as f64 / 1e9).filter(|t_s| *t_s < end_s).fold(0.0, f64::max)
-}
-
-fn coordination_summary(coordination: &Coordination, facts: &Facts, last_speed_s: f64) -> CoordinationSummary {
+fn coordination_summary(
+    coordination: &Coordination,
+    facts: &Facts,
+    fit: Option<ExponentialFit>,
+) -> CoordinationSummary {
     let (t_s, spread, norm) = (&coordination.t_s, coordination.spread(), coordination.norm());
     let peak = largest(spread.iter().copied());
-    let fit = fit_coordination(t_s, &norm, coordination.disturbance.as_deref(), last_speed_s, facts.link_period_s);
     let kept = thinned(t_s.len(), SERIES_SAMPLES);
     let pick = |values: &[f64]| kept.iter().map(|index| values[*index]).collect();
     let steady = steady_part(t_s, facts);

@@ -55,7 +55,8 @@ pub(super) fn check_law(
     let law = match build::law(&choice, &in_order) {
         Ok(law) => law,
         Err(reason) => {
-            faults.fault(&format!("{key}.{name}"), reason, "gains above 0");
+            let gain = refused_gain(&choice, name, &reason).map_or(String::new(), |gain| format!(".{gain}"));
+            faults.fault(&format!("{key}.{name}{gain}"), reason, "gains above 0");
             return None;
         }
     };
@@ -65,6 +66,15 @@ pub(super) fn check_law(
     let choices = check_own_gains(faults, file)?;
     let law = build::diagonal(&choices, &in_order).map_err(|reason| faults.fault("vehicles", reason, "gains above 0"));
     Some((law.ok()?, choices))
+}
+
+/// The key of the gain that a law refuses, if its reason names one that is in the file: a_1 is `a1` there, and a gain that is the only
+/// one `gain`.
+fn refused_gain(choice: &LawChoice, name: &str, reason: &str) -> Option<String> {
+    let symbol = reason.strip_prefix("the gain ")?.split(' ').next()?.replace('_', "");
+    let law = toml::Value::try_from(choice).ok()?;
+    let gains = law.get(name)?.as_table()?;
+    [symbol.as_str(), "gain"].into_iter().find(|key| gains.contains_key(*key)).map(str::to_owned)
 }
 
 /// The law of each vehicle, with its own gains if it has some.

@@ -308,6 +308,14 @@ mod tests {
                 "found m_v must be positive",
             ),
             (FIG_3_7, "{ proposition31 = {} }", "{ proposition33 = {} }", "allowed: proposition31, proposition32"),
+            (HELIX, "gain = 0.1,", "gain = -0.1,", "coordination.law.delayed_with_losses.gain: found the gain k must"),
+            (FIG_3_7, "b = 0.25,", "b = 0.0,", "coordination.law.solution3.b: found the gain b must be positive"),
+            (
+                FIG_3_7,
+                "x_m = 1.0 } }   #",
+                "x_m = 0.0 } }   #",
+                "coordination.law.solution3: found the saturation x_m must",
+            ),
             (lanes, "xi = [0, 31,", "xi = [0, 0,", "vehicles[0].path.geojson: found the step of xi after waypoint 0"),
             (lanes, "xi = [0, 31,", "rate_m = 1.0\nxi = [0, 31,", "both rate_m and xi"),
             (lanes, "latitude_deg = 38.689", "latitude_deg = 138.0", "longitude first"),
@@ -404,7 +412,7 @@ mod tests {
             let found = faults(&text);
             let expected = if vehicles.is_empty() { "found no vehicles; " } else { "vehicles: found an integer; " };
             assert!(found.iter().any(|line| line.contains(expected)), "{found:#?}");
-            assert!(found.iter().any(|line| line.contains("delayed_with_losses: found ")), "{found:#?}");
+            assert!(found.iter().any(|line| line.contains("delayed_with_losses.gain: found ")), "{found:#?}");
             assert_eq!(found.len(), 2, "{found:#?}");
         }
     }
