@@ -409,7 +409,7 @@ fn a_fleet_that_goes_back_along_its_paths_is_ahead_of_its_targets() {
 fn path_following_asks_for_speeds_that_coordination_keeps_in_bounds() {
     const NAME: &str = "Path following (Propositions 3.1 to 3.3";
     assert_eq!(row(&thesis("fig-3-10"), NAME).holds, Some(true));
-    let slack = with(&thesis("fig-3-10"), "a = 1.0", "a = 0.5");
+    let slack = with(&thesis("fig-3-10"), "a = 2.0", "a = 0.5");
     assert_broken(&slack, NAME, "no statement holds");
     assert_eq!(row(&slack, "Fleet speed").predicted, "0.10000 1/s, if they agree");
     let late = |text: &str| with(text, "[network]", "[network]\ndelay = { constant = { delay_s = 1.0 } }");
@@ -486,7 +486,8 @@ fn the_bound_of_talk_by_event_holds_for_kinematic_vehicles_along_their_lines() {
     let row = rows.iter().find(|row| row.name.contains(NAME)).expect("a row");
     let most: f64 = row.predicted.split(' ').find_map(|word| word.parse().ok()).expect("a number");
     assert!(row.holds == Some(true) && summary.fleet.coordination.last < most, "{row:?}");
-    assert!(summary.fleet.coordination.steady_rms > 0.02 * most, "the bound is of another order: {row:?}");
+    // g = √6 for three in a row, threshold 0.05, news 0.15 s old: docs/talking.md.
+    assert!((most - 0.2015).abs() < 1e-4, "{row:?}");
     assert_broken(&with(&text, "between = \"advance\"", "between = \"hold\""), NAME, "do not move on at v_L");
     assert_broken(&with(&text, "x_m = 4.0, y_m = 0.0 }", "x_m = 4.0, y_m = 0.5 }"), NAME, "does not move just as told");
     let lossy = with(&text, "[network]", "[network]\nloss = { bernoulli = { probability = 0.1 } }");
