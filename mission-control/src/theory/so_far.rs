@@ -231,6 +231,11 @@ mod tests {
         let gone = so_far(&mission, &status).expect("time has passed");
         assert!(gone.covered_by.is_none() && gone.verdict.contains("auv3 is not connected"), "{}", gone.verdict);
         let (mission, mut status) = at(60.0, [30.0, 30.1, 30.2], [true; 3]);
+        status.vehicles[0].phase = Phase::Aborted;
+        status.vehicles[0].reason = "it has diverged".into();
+        let gave_up = so_far(&mission, &status).expect("time has passed");
+        assert!(gave_up.covered_by.is_none() && gave_up.verdict.contains("auv1 gave up: it has diverged"), "{gave_up}");
+        status.vehicles[0].phase = Phase::Running;
         status.vehicles[1].said = Some((Time::from_secs(50.0), 25.0));
         let silent = so_far(&mission, &status).expect("time has passed");
         assert!(silent.verdict.contains("auv2 is silent since 50.0 s"), "{}", silent.verdict);
