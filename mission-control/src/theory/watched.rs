@@ -49,7 +49,9 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
 /// What is guaranteed for the network as it was: the monitor's envelope, or what other laws' statements promise.
 pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guarantee> {
     let case = Case::new(mission, Some(summary));
-    let Some(looked) = looked_for(mission, &case.network) else { return guarantee_of(&case) };
+    let Some(looked) = looked_for(mission, &case.network) else {
+        return guarantee_of(&case).filter(|_| summary.fleet.aborted.is_empty());
+    };
     let seen = seen(mission, summary.fleet.connectivity.as_ref()?, &looked)?;
     let broken = looked.broken.iter().cloned().chain(not_there(&summary.fleet)).collect();
     let envelope = monitor::watch(&looked.watched, &case.network.graphs, seen, broken).envelope?;
