@@ -103,7 +103,8 @@ fn a_fleet_that_is_not_told_the_delay_finds_its_speed() {
     assert_close("v_L*", estimated.fleet.steady_speed, 0.5 / 1.5, 1e-2);
     assert!(steady(&estimated) < 0.05 && steady(&told) < 0.05, "{} {}", steady(&estimated), steady(&told));
     assert!(steady(&not_told) > 1.0, "{}", steady(&not_told));
-    assert_eq!(estimated.fleet.predicted_speed, Some(0.5 / 1.5));
+    // No theorem says so, and none is laid beside it.
+    assert_eq!(estimated.fleet.predicted_speed, None);
 }
 
 #[test]

@@ -6,7 +6,25 @@ use super::file::LawChoice;
 impl Mission {
     /// What is allowed and hardly meant, in words.
     pub fn advice(&self) -> Vec<String> {
-        self.sampled_step().filter(|step| *step > 1.0).map(|step| too_far(step, self)).into_iter().collect()
+        let rate = self.sampled_step().filter(|step| *step > 1.0).map(|step| too_far(step, self));
+        let speed = self.damping_step().filter(|step| *step > 1.0).map(|step| too_hard(step, self));
+        rate.into_iter().chain(speed).collect()
+    }
+
+    /// How far a control period takes the speed of a vehicle to where its law wants it, as a part of the way, under the laws of chapter 2, which
+    /// ask for accelerations: aT.
+    ///
+    /// A speed v with v' = −a v − bξ − ..., held for T, has with x = ξ the polynomial (z − 1)² + aT(z − 1) + bT²(z + 1)/2, which at z = −1 is
+    /// 4 − 2aT: above aT = 2 a root is left of −1, whatever b. Above 1 it steps past.
+    fn damping_step(&self) -> Option<f64> {
+        let a = match &self.law_choice {
+            LawChoice::LeaderFollower(law) => law.a.max(law.a1),
+            LawChoice::Gateway(law) => law.a,
+            LawChoice::GatewayIntegral(law) => law.a,
+            LawChoice::Neighbours(law) => law.a,
+            _ => return None,
+        };
+        Some(a * self.control_period.secs())
     }
 
     /// How far a control period takes a vehicle towards the mean of its neighbours, as a part of the way, under laws with a
@@ -38,11 +56,21 @@ fn too_far(step: f64, mission: &Mission) -> String {
     )
 }
 
+fn too_hard(step: f64, mission: &Mission) -> String {
+    let period = mission.control_period.secs();
+    let outcome = if step > 2.0 { "the sampled law is unstable" } else { "the sampled law may be unstable" };
+    format!(
+        "coordination.law: a control period of {period} s takes the speed of a vehicle {step:.3e} times the way to where gain a wants it; \
+         above 1 it steps past, and {outcome}: a smaller gain or control period keeps it below"
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const PLANE: &str = include_str!("../../../missions/thesis/fig-4-2.toml");
+    const GATEWAY: &str = include_str!("../../../missions/thesis/fig-2-12.toml");
     const HELIX: &str = include_str!("../../../missions/auv-helix.toml");
 
     fn advice(text: &str, old: &str, new: &str) -> Vec<String> {
@@ -57,6 +85,11 @@ mod tests {
         // k T = 20 · 0.05 = 1: a mean over the neighbours, so their number does not count.
         assert_eq!(advice(HELIX, "gain = 0.1", "gain = 20.0"), [""; 0]);
         assert!(advice(HELIX, "gain = 0.1", "gain = 30.0")[0].contains("may be unstable"));
+        // a T = 3 · 0.02, and with a = 120: 2.4.
+        assert_eq!(advice(GATEWAY, " a = 3.0", " a = 3.0"), [""; 0]);
+        assert!(advice(GATEWAY, " a = 3.0", " a = 60.0")[0].contains("may be unstable"));
+        assert!(advice(GATEWAY, " a = 3.0", " a = 120.0")[0].contains("2.400e0 times the way"));
+        assert!(advice(GATEWAY, " a = 3.0", " a = 120.0")[0].contains("law is unstable"));
         assert!(advice(HELIX, "gain = 0.1", "gain = 1e6")[0].contains("5.000e4 times the way"));
     }
 }

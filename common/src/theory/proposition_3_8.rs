@@ -38,8 +38,9 @@ pub fn least_eigenvalue(graph: &Graph, a: &[f64], r: &[f64]) -> Option<f64> {
 
 /// What the proposition says of a fleet with gains a_i that meets these R_i on its way, one list for each place.
 ///
-/// It holds if (3.97) does at every place, or else if Q > 0 at every place.
-pub fn verdict(graph: &Graph, a: &[f64], places: &[Vec<f64>]) -> Verdict {
+/// It holds if (3.97) does at every place, or else if Q > 0 at every place, and if the network is `fixed`: it never changes, and passes
+/// everything on at once.
+pub fn verdict(graph: &Graph, a: &[f64], places: &[Vec<f64>], fixed: bool) -> Verdict {
     let a_1 = a.iter().copied().fold(f64::INFINITY, f64::min);
     // C changes along the way, and the bounds (3.42) are those over all places.
     let all: Vec<f64> = places.iter().flatten().copied().collect();
@@ -49,14 +50,17 @@ pub fn verdict(graph: &Graph, a: &[f64], places: &[Vec<f64>]) -> Verdict {
     let two_way = graph.is_undirected() && graph.is_connected();
     Verdict {
         name: "Proposition 3.8 (bounded speeds)",
-        condition: format!("two-way and connected; Q > 0, for which a₁² > {threshold:.4} (3.97) is enough"),
+        condition: format!(
+            "fixed two-way connected network, no delay, no loss; Q > 0, for which a₁² > {threshold:.4} (3.97) is enough"
+        ),
         value: format!(
-            "a₁² = {:.4}{}, least eigenvalue of Q {}",
+            "a₁² = {:.4}{}, least eigenvalue of Q {}{}",
             a_1 * a_1,
             if meets { "" } else { ", not enough" },
-            least.map_or("–".to_owned(), |least| format!("{least:.4}"))
+            least.map_or("–".to_owned(), |least| format!("{least:.4}")),
+            if fixed { "" } else { ", the network changes, delays or loses" }
         ),
-        holds: two_way && (meets || least.is_some_and(|least| least > 0.0)),
+        holds: fixed && two_way && (meets || least.is_some_and(|least| least > 0.0)),
         norm_rate: None,
     }
 }
@@ -76,14 +80,14 @@ mod tests {
         let least = |r: &Vec<f64>| least_eigenvalue(&star, &[1.0; 3], r).expect("sizes fit");
         let of_legs: Vec<f64> = legs.iter().map(least).collect();
         assert!(of_legs.iter().all(|&least| (2.0 - 1e-9..5.2).contains(&least)), "{of_legs:?}");
-        let verdict = verdict(&star, &[1.0; 3], &legs);
+        let verdict = verdict(&star, &[1.0; 3], &legs, true);
         assert!(verdict.holds && verdict.value.contains("not enough"));
     }
 
     #[test]
     fn very_different_paths_break_it() {
         let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
-        let verdict = verdict(&star, &[0.2; 3], &[vec![20.0, 1.0, 1.0]]);
+        let verdict = verdict(&star, &[0.2; 3], &[vec![20.0, 1.0, 1.0]], true);
         assert!(!verdict.holds, "{verdict:?}");
         assert_eq!(least_eigenvalue(&star, &[1.0; 2], &[1.0; 3]), None);
     }
@@ -119,7 +123,7 @@ mod tests {
     #[test]
     fn either_condition_will_do_on_a_two_way_connected_network_only() {
         let star = Graph::from_edges(3, &[(0, 1), (0, 2)]);
-        let at = |graph: &Graph, r: [f64; 3]| verdict(graph, &[0.5; 3], &[r.to_vec()]);
+        let at = |graph: &Graph, r: [f64; 3]| verdict(graph, &[0.5; 3], &[r.to_vec()], true);
         // (3.97) with a_1² = 0.25: 0.2 is enough, 0.4 is not, but Q is still positive there.
         let meets = at(&star, [1.2, 1.0, 1.0]);
         assert!(meets.holds && meets.value.starts_with("a₁² = 0.2500,") && !meets.value.contains("not enough"));
@@ -131,7 +135,10 @@ mod tests {
         for graph in [Graph::from_arcs(3, &[(0, 1), (1, 2), (2, 0)]), Graph::from_edges(3, &[(0, 1)])] {
             assert!(threshold(&graph, &[0.5; 3], &[1.0; 3]) <= 0.0 && !at(&graph, [1.0; 3]).holds);
         }
+        // The same numbers, but late or lost.
+        let late = verdict(&star, &[0.5; 3], &[vec![1.2, 1.0, 1.0]], false);
+        assert!(!late.holds && late.value.contains("changes, delays or loses"), "{late:?}");
         // One place where Q is not positive is enough to fail.
-        assert!(!verdict(&star, &[0.2; 3], &[vec![1.0; 3], vec![20.0, 1.0, 1.0]]).holds);
+        assert!(!verdict(&star, &[0.2; 3], &[vec![1.0; 3], vec![20.0, 1.0, 1.0]], true).holds);
     }
 }

@@ -73,6 +73,9 @@ pub struct FleetSummary {
     pub absences: Vec<Absence>,
     /// The connectivity before the first of these, if there is one.
     pub connectivity_before: Option<Connectivity>,
+    /// Which vehicles gave up, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub aborted: Vec<String>,
 }
 
 /// A time in which a vehicle recorded nothing.
@@ -327,6 +330,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         connectivity: network.connectivity_heard(exact, facts),
         connectivity_before: first_absence.and_then(|at| network.until(at).connectivity_heard(exact, facts)),
         absences,
+        aborted: facts.aborted.clone(),
         coordination: coordination_summary(&coordination, facts, Decay::of(&coordination, exact, facts).fit),
     };
     let complete = recording.complete && facts.missing.is_empty() && vehicles.iter().all(|vehicle| vehicle.rows > 0);

@@ -1,6 +1,5 @@
 //! Coordination with late information, (4.34) and (4.42).
 
-use common::mission::Mission;
 use common::mission::file::{Delayed, LawChoice};
 use common::theory::delay::{self, DelayGains};
 use common::theory::delay_rate;
@@ -12,11 +11,15 @@ use super::premises::{premises_of_late_news, too_rare};
 use crate::results::TheoryRow;
 
 pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
+    vec![row(case, law.gain, Span::from_secs(law.delay_s))]
+}
+
+/// What the lemmas say of this gain and delay.
+pub(super) fn row(case: &Case<'_>, gain: f64, tau: Span) -> TheoryRow {
     let Case { mission, network, .. } = case;
-    let tau = Span::from_secs(law.delay_s);
     let v_l = mission.speed.at(mission.end).v_l;
     let in_mean = network.planned.connected_in_mean().is_some();
-    let verdict = delay::verdict(DelayGains::Averaged(law.gain), tau, v_l, in_mean);
+    let verdict = delay::verdict(DelayGains::Averaged(gain), tau, v_l, in_mean);
     let bears_losses = matches!(mission.law_choice, LawChoice::DelayedWithLosses(_));
     let broken = premises_of_late_news(mission, network, tau);
     let rare = too_rare(mission, network, &Watched::Delayed);
@@ -26,8 +29,8 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
         value += &format!("; {found}");
     }
     // On a network that never changes the rate is known exactly.
-    let rate = (holds && network.graphs.len() == 1).then(|| delay_rate::rate(&network.graph, law.gain, tau)).flatten();
-    vec![TheoryRow {
+    let rate = (holds && network.graphs.len() == 1).then(|| delay_rate::rate(&network.graph, gain, tau)).flatten();
+    TheoryRow {
         condition: if bears_losses {
             format!("{}, type II, every message τ late and none lost but by the switching", verdict.condition)
         } else {
@@ -42,10 +45,5 @@ pub(super) fn rows(case: &Case<'_>, law: &Delayed) -> Vec<TheoryRow> {
         },
         guaranteed_rate: rate,
         ..case.row(verdict)
-    }]
-}
-
-/// Whether the law was told the delay that the link has.
-pub(super) fn told_truly(mission: &Mission, tau: f64) -> bool {
-    mission.every_message_takes(Span::from_secs(tau))
+    }
 }

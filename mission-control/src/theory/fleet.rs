@@ -5,8 +5,8 @@ use common::mission::file::LawChoice;
 use common::time::Span;
 
 use super::Case;
-use super::delayed::told_truly;
 use super::graph::graph_facts;
+use super::late_news::as_the_law_takes_them;
 use super::learned_speeds::stuck_at_the_end;
 use super::premises::minds_no_hull;
 use super::steady_motion::{is_excited, motion};
@@ -121,10 +121,15 @@ pub(super) fn rate_in_the_end(case: &Case<'_>, v_l: f64) -> Result<f64, String> 
     let (mission, disturbed) = (case.mission, &case.disturbances);
     match travels(mission) {
         Travel::Nowhere => Err("nothing makes the vehicles agree".into()),
-        Travel::With(_, rate) if minds_no_hull(mission) || disturbed.only_failures() => Ok(rate),
+        Travel::With(_, rate) if minds_no_hull(mission) || disturbed.only_failures() => {
+            as_the_law_takes_them(case).map(|()| rate)
+        }
         Travel::Told if minds_no_hull(mission) || disturbed.is_empty() => match is_excited(mission) {
             true => Ok(motion(case, v_l)?.rate),
-            false => speed_factor(mission).map(|factor| factor * v_l).ok_or_else(|| "delays differ".into()),
+            false => {
+                as_the_law_takes_them(case)?;
+                speed_factor(mission).map(|factor| factor * v_l).ok_or_else(|| "delays differ".into())
+            }
         },
         _ => Err("disturbed".into()),
     }
@@ -164,15 +169,26 @@ fn travels(mission: &Mission) -> Travel {
     }
 }
 
-pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
+/// The rate of the fleet in the end; who is not known to agree goes at it if they do.
+pub(super) fn speed(case: &Case<'_>, statements: &[TheoryRow]) -> TheoryRow {
     let mission = case.mission;
     let v_l = v_l_at_the_end(case);
     let excited = is_excited(mission);
     let why_not = excited.then(|| motion(case, v_l).err()).flatten();
-    let holds = match (excited, mission.law_delay()) {
-        (true, _) => Some(why_not.is_none() && case.disturbances.is_empty()),
-        (false, tau) => tau.map(|tau| told_truly(mission, tau)),
+    let known = rate_in_the_end(case, v_l);
+    let late = as_the_law_takes_them(case).err();
+    let slowed = matches!(
+        mission.law_choice,
+        LawChoice::Delayed(_) | LawChoice::DelayedWithLosses(_) | LawChoice::DelayedEstimating(_)
+    );
+    let holds = match travels(mission) {
+        Travel::Nowhere => None,
+        _ if excited => Some(why_not.is_none() && case.disturbances.is_empty()),
+        _ if slowed => Some(known.is_ok()),
+        _ => late.is_some().then_some(false),
     };
+    let agree = mission.vehicles.len() < 2 || statements.iter().any(|row| row.holds == Some(true));
+    let late = late.map_or(String::new(), |why| format!("; not predicted: {why}"));
     let (name, condition, value) = match (mission.law_delay(), travels(mission)) {
         (_, Travel::Nowhere) => {
             let why = if stuck_at_the_end(mission).is_empty() { "no coordination" } else { "a failure (see above)" };
@@ -181,7 +197,7 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
         (_, Travel::With(failed, _)) => (
             "Fleet speed of a stuck vehicle, v/R (2.41), (2.43)",
             "one vehicle stuck to the end, whose speed the others learn".to_string(),
-            format!("{} is stuck", mission.vehicles[failed].id),
+            format!("{} is stuck{late}", mission.vehicles[failed].id),
         ),
         _ if excited => {
             let name = match mission.law_choice {
@@ -193,19 +209,34 @@ pub(super) fn speed(case: &Case<'_>) -> TheoryRow {
         }
         (Some(tau), _) => (
             "Fleet speed v_L* = v_L/(1 + kτ) (after Lemma 4.4)",
-            format!("every message τ = {tau} s late"),
-            format!("v_L = {v_l:.4}, v_L*/v_L = {:.4}", mission.nominal_factor()),
+            match mission.law_choice {
+                LawChoice::Delayed(_) => {
+                    format!("every message τ = {tau} s late and none lost, everybody always hears someone")
+                }
+                _ => format!("every message τ = {tau} s late and none lost but by the switching"),
+            },
+            format!("v_L = {v_l:.4}, v_L*/v_L = {:.4}{late}", mission.nominal_factor()),
         ),
-        (None, _) => ("Fleet speed v_L", "the vehicles agree".to_string(), format!("v_L = {v_l:.4}")),
+        (None, _) if slowed => (
+            "Fleet speed v_L* = v_L/(1 + kτ) (after Lemma 4.4)",
+            "every message τ late and none lost, everybody always hears someone".to_string(),
+            format!("v_L = {v_l:.4}{late}"),
+        ),
+        (None, _) => (
+            "Fleet speed v_L",
+            "the vehicles agree, and hear one another in time".to_string(),
+            format!("v_L = {v_l:.4}{late}"),
+        ),
     };
     TheoryRow {
         name: name.into(),
         condition,
         value,
         holds,
-        predicted: predicted_speed(mission, v_l)
+        predicted: known
+            .ok()
             .filter(|_| !excited || holds == Some(true))
-            .map_or("–".into(), |speed| format!("{speed:.5} 1/s")),
+            .map_or("–".into(), |speed| format!("{speed:.5} 1/s{}", if agree { "" } else { ", if they agree" })),
         measured: case.measured(|s| format!("{:.5} 1/s", s.fleet.steady_speed)),
         ..TheoryRow::default()
     }

@@ -19,6 +19,8 @@
 //! | auxiliary state | Theorems 4.8, 4.9 | `auxiliary.rs` |
 //! | switching networks | Theorems 4.4, 4.5 | `switching.rs` |
 //! | late information | Lemmas 4.4, 4.5 | `delayed.rs` |
+//! | whether news are as late as a law takes them to be | section 4.4 | `late_news.rs` |
+//! | known and estimated delays, talk by event | docs/talking.md | `talk.rs` |
 //! | what those of chapter 4 take for granted | sections 4.1, 4.4 | `premises.rs` |
 //! | the run as flown | Theorems 4.4, 4.5, Lemmas 4.4–4.7 | `watched.rs` |
 //! | the run so far | the same | `so_far.rs` |
@@ -33,6 +35,7 @@ mod figures;
 mod fleet;
 mod graph;
 mod introduction;
+mod late_news;
 mod learned_speeds;
 mod network;
 mod premises;
@@ -191,12 +194,22 @@ pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
         rows.extend(together);
         rows.extend(talk::row_of_events(&case));
     }
-    rows.extend(together::path_following(&case));
-    rows.push(fleet::speed(&case));
+    let statements = law_rows(&case);
+    rows.extend(together::path_following(&case, &statements));
+    rows.push(fleet::speed(&case, &statements));
     rows.extend(steady_motion::apart(&case));
     rows.extend(steady_motion::bias(&case));
+    let mut rows: Vec<TheoryRow> = rows.into_iter().map(promises_if_it_holds).collect();
     rows.extend(watched::row(&case));
     rows
+}
+
+/// A statement whose conditions do not hold promises nothing.
+fn promises_if_it_holds(row: TheoryRow) -> TheoryRow {
+    match row.holds {
+        Some(false) => TheoryRow { predicted: "–".into(), guaranteed_rate: None, ..row },
+        _ => row,
+    }
 }
 
 /// What the statements behind the mission's law ask for and promise.
@@ -233,7 +246,7 @@ fn statements(case: &Case<'_>, law: &LawChoice) -> Vec<TheoryRow> {
         LawChoice::Auxiliary(law) => auxiliary::rows_fixed(case, law),
         LawChoice::AuxiliarySwitching(law) => auxiliary::rows_switching(case, law),
         LawChoice::Switching(_) => switching::rows(case),
-        LawChoice::DelayedEstimating(_) => talk::rows_of_estimating(case),
+        LawChoice::DelayedEstimating(law) => talk::rows_of_estimating(case, law),
         LawChoice::KnownDelay(law) => talk::rows_of_known_delay(case, law),
         LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => delayed::rows(case, law),
         // Sections 2.2 to 2.4, which speak of failures too, are above.

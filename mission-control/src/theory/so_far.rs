@@ -4,6 +4,7 @@ use common::mission::Mission;
 use common::theory::monitor::{self, Envelope, Margin, Premise, Seen};
 use common::time::{Span, Time};
 use common::wire::fleet::FleetStatus;
+use common::wire::vehicle::Phase;
 use serde::Serialize;
 
 use super::network::Network;
@@ -144,6 +145,7 @@ fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
             let last = of.and_then(|of| of.said).map(|(made, _)| made);
             let since = last.map_or(String::new(), |made| format!(" since {:.1} s", made.secs()));
             match of {
+                Some(of) if of.phase == Phase::Aborted => Some(format!("{} gave up{}", plan.id, because(&of.reason))),
                 Some(of) if !of.connected => Some(format!("{} is not connected, silent{since}", plan.id)),
                 None => Some(format!("{} is not connected", plan.id)),
                 Some(_) if mission.talk.is_none() && last.is_some_and(|made| status.now - made > silent) => {
@@ -154,6 +156,10 @@ fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
         })
         .collect();
     (!found.is_empty()).then(|| Premise { asks: "every vehicle all the time", found: found.join(", ") })
+}
+
+fn because(reason: &str) -> String {
+    if reason.is_empty() { String::new() } else { format!(": {reason}") }
 }
 
 fn at_start(mission: &Mission) -> Vec<f64> {
@@ -178,7 +184,6 @@ fn norm(states: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use common::wire::fleet::VehicleStatus;
-    use common::wire::vehicle::Phase;
 
     use super::*;
 
@@ -226,6 +231,11 @@ mod tests {
         let gone = so_far(&mission, &status).expect("time has passed");
         assert!(gone.covered_by.is_none() && gone.verdict.contains("auv3 is not connected"), "{}", gone.verdict);
         let (mission, mut status) = at(60.0, [30.0, 30.1, 30.2], [true; 3]);
+        status.vehicles[0].phase = Phase::Aborted;
+        status.vehicles[0].reason = "it has diverged".into();
+        let gave_up = so_far(&mission, &status).expect("time has passed");
+        assert!(gave_up.covered_by.is_none() && gave_up.verdict.contains("auv1 gave up: it has diverged"), "{gave_up}");
+        status.vehicles[0].phase = Phase::Running;
         status.vehicles[1].said = Some((Time::from_secs(50.0), 25.0));
         let silent = so_far(&mission, &status).expect("time has passed");
         assert!(silent.verdict.contains("auv2 is silent since 50.0 s"), "{}", silent.verdict);

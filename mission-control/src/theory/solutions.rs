@@ -25,7 +25,7 @@ pub(super) fn rows(case: &Case<'_>, law: Law) -> Vec<TheoryRow> {
 /// Proposition 3.8, for the saturated laws.
 pub(super) fn bounded_speeds(case: &Case<'_>) -> TheoryRow {
     let graph = &case.network.graph;
-    let bounded = proposition_3_8::verdict(graph, &case.mission.gains("a"), &case.way.places);
+    let bounded = proposition_3_8::verdict(graph, &case.mission.gains("a"), &case.way.places, case.network.is_fixed());
     TheoryRow {
         predicted: if bounded.holds { "speeds stay bounded, paths are reached".into() } else { "–".into() },
         measured: case.measured(|s| format!("{:.3e} m off the paths at the end", s.fleet.path_error_final_m)),

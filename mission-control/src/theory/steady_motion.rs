@@ -8,8 +8,8 @@ use common::theory::steady_motion::{Settling, SteadyMotion, alike, steady_motion
 use common::time::Span;
 
 use super::Case;
-use super::delayed::told_truly;
 use super::fleet::{rate_in_the_end, v_l_at_the_end};
+use super::late_news::as_the_law_takes_them;
 use super::talk::common_delay;
 use crate::results::TheoryRow;
 
@@ -35,21 +35,13 @@ pub(super) fn motion(case: &Case<'_>, v_l: f64) -> Result<SteadyMotion, String> 
     if way.constant().is_none() {
         return Err("|p'| changes on the way, and α₂ with it: there is no steady rate".into());
     }
-    let (lag, in_time) = match &mission.law_choice {
-        LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => {
-            (law.gain * law.delay_s, told_truly(mission, law.delay_s))
-        }
-        LawChoice::DelayedEstimating(law) => {
-            let delay = common_delay(mission);
-            (law.gain * delay.map_or(0.0, Span::secs), delay.is_some())
-        }
-        LawChoice::KnownDelay(_) => (0.0, true),
-        _ => (0.0, mission.every_message_takes(Span::ZERO)),
+    as_the_law_takes_them(case)?;
+    let lag = match &mission.law_choice {
+        LawChoice::Delayed(law) | LawChoice::DelayedWithLosses(law) => law.gain * law.delay_s,
+        LawChoice::DelayedEstimating(law) => law.gain * common_delay(mission).map_or(0.0, Span::secs),
+        _ => 0.0,
     };
-    if !in_time {
-        return Err("messages are not as late as the law takes them to be".into());
-    }
-    let vehicles: Option<Vec<Settling>> = (0..mission.vehicles.len()).map(|i| settling(case, i)).collect();
+    let vehicles: Option<Vec<Settling>> = (0..mission.vehicles.len()).map(|i| settling(case, i, v_l)).collect();
     let vehicles = vehicles.ok_or("no statement about the steady rate of targets with α₂ under this law")?;
     // Vehicles that are alike agree, and who agrees does not mind who is heard; but who hears late goes at another rate when alone.
     let fixed = network.graphs.len() == 1 && mission.loses_by_switching_only();
@@ -60,12 +52,18 @@ pub(super) fn motion(case: &Case<'_>, v_l: f64) -> Result<SteadyMotion, String> 
         .ok_or_else(|| "nobody is heard by all".to_string())
 }
 
+/// Which way hulls point along their paths: 1 if as the path goes, −1 if v_L sends them back along it. δ₁ < 0 turns every hull to where
+/// its target goes, and p' is ±|p'| in its axes.
+fn heading(v_l: f64) -> f64 {
+    if v_l < 0.0 { -1.0 } else { 1.0 }
+}
+
 /// How a vehicle settles under the mission's law.
-fn settling(case: &Case<'_>, vehicle: usize) -> Option<Settling> {
+fn settling(case: &Case<'_>, vehicle: usize, v_l: f64) -> Option<Settling> {
     let Case { mission, network, .. } = case;
     let (gains, auv) = mission.theorem_47(vehicle)?;
     let plan = mission.vehicles.get(vehicle)?;
-    let stretch = plan.path.at(plan.start.xi).r();
+    let stretch = heading(v_l) * plan.path.at(plan.start.xi).r();
     let [a_0, at_one] = [0.0, 1.0].map(|x| gains.steady_alpha_2(&auv, x, stretch));
     let of_type = if is_type_1(mission, vehicle) { gains.k_eta } else { f64::INFINITY };
     let shared = |gain: f64| gain / network.graph.degree(vehicle) as f64;
@@ -89,8 +87,8 @@ fn settling(case: &Case<'_>, vehicle: usize) -> Option<Settling> {
 /// Why none can be told.
 pub(super) fn biases(case: &Case<'_>, v_l: f64) -> Result<Vec<Option<f64>>, String> {
     let mission = case.mission;
-    if mission.law_delay().is_some_and(|tau| !told_truly(mission, tau)) {
-        return Err("messages are not as late as the law takes them to be".into());
+    if v_l == 0.0 {
+        return Err("v_L = 0, and hulls may point anywhere".into());
     }
     let rate = rate_in_the_end(case, v_l)?;
     let surplus = rate - mission.nominal_factor() * v_l;
@@ -99,7 +97,8 @@ pub(super) fn biases(case: &Case<'_>, v_l: f64) -> Result<Vec<Option<f64>>, Stri
     }
     let of = |(i, plan): (usize, &common::mission::VehiclePlan)| {
         let (gains, auv) = mission.theorem_47(i)?;
-        Some(gains.predicted_bias_at(&auv, surplus * plan.path.at(plan.start.xi).r()))
+        let stretch = heading(v_l) * plan.path.at(plan.start.xi).r();
+        Some(heading(v_l) * gains.predicted_bias_at(&auv, surplus * stretch))
     };
     Ok(mission.vehicles.iter().enumerate().map(of).collect())
 }
@@ -175,16 +174,17 @@ fn words<'a>(of: impl Iterator<Item = (&'a str, Option<f64>)>) -> String {
 /// How far apart vehicles that are not alike stay, if α_2 reaches their targets.
 pub(super) fn apart(case: &Case<'_>) -> Option<TheoryRow> {
     let mission = case.mission;
-    let vehicles: Vec<Settling> = (0..mission.vehicles.len()).map(|i| settling(case, i)).collect::<Option<_>>()?;
+    let v_l = v_l_at_the_end(case);
+    let vehicles: Vec<Settling> = (0..mission.vehicles.len()).map(|i| settling(case, i, v_l)).collect::<Option<_>>()?;
     if !is_excited(mission) || alike(&vehicles) {
         return None;
     }
-    let found = motion(case, v_l_at_the_end(case)).ok().filter(|_| case.disturbances.is_empty());
+    let found = motion(case, v_l).ok().filter(|_| case.disturbances.is_empty());
     let spread = |apart: &[f64]| {
         let (least, most) = apart.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
         most - least
     };
-    let why = motion(case, v_l_at_the_end(case)).err();
+    let why = motion(case, v_l).err();
     Some(TheoryRow {
         name: "Coordination error that unequal vehicles leave (result xiii)".into(),
         condition: "a fixed network, |p'| constant, v_L constant, undisturbed".into(),

@@ -1,30 +1,41 @@
 //! Known and estimated delays, and talk by event.
 
-use common::mission::file::{Between, KnownDelay, LawChoice};
-use common::mission::{Link, Mission};
+use common::mission::file::{Between, DelayedEstimating, KnownDelay, LawChoice, ModelChoice};
+use common::mission::{Link, Mission, VehiclePlan};
 use common::network::Delay;
 use common::theory::{delay, event_triggered, known_delay};
 use common::time::Span;
 
-use super::Case;
+use super::late_news::is_4_34;
 use super::switching::moves_as_told;
+use super::{Case, delayed};
 use crate::results::TheoryRow;
 
-/// The law that estimates v_L*.
-pub(super) fn rows_of_estimating(case: &Case<'_>) -> Vec<TheoryRow> {
-    let in_mean = case.network.planned.connected_in_mean().is_some();
-    let one_delay = common_delay(case.mission).is_some();
-    let value = format!(
-        "{}, {}",
-        if in_mean { "connected in mean" } else { "not connected in mean" },
-        if one_delay { "one delay" } else { "delays that differ" }
-    );
+/// The law that estimates v_L*. While somebody is alone, no theorem speaks of it: docs/talking.md has an estimate of what T must be, and
+/// fleets that keep to all other premises and do not agree. Where nobody ever is, it is (4.34), and Lemma 4.4 holds.
+pub(super) fn rows_of_estimating(case: &Case<'_>, law: &DelayedEstimating) -> Vec<TheoryRow> {
+    let tau = common_delay(case.mission);
+    if let Some(tau) = tau.filter(|_| is_4_34(case)) {
+        let row = delayed::row(case, law.gain, tau);
+        let value =
+            format!("nobody is ever alone, so that the estimate is not used and the law is (4.34); {}", row.value);
+        return vec![TheoryRow { value, ..row }];
+    }
+    let least = |tau: Span| (1.0 + law.gain * tau.secs()) / law.gain;
+    let value = match tau {
+        Some(tau) => {
+            format!("T = {} s, and vehicles alike want T ≥ (1 + kτ)/k = {} s", law.time_constant_s, least(tau))
+        }
+        None => "delays differ, of which nothing is known".into(),
+    };
     vec![TheoryRow {
-        name: "Agreement at an estimated v_L* (after Lemma 4.5)".into(),
-        condition: "connected in mean, one constant delay, none lost but by the switching".into(),
+        name: "Agreement at an estimated v_L*".into(),
+        condition:
+            "a theorem about vehicles that are alone with an estimate; there is none, docs/talking.md has an estimate"
+                .into(),
         value,
-        holds: Some(in_mean && one_delay && case.mission.loses_by_switching_only()),
-        predicted: "v_L* is the only rest of the estimate".into(),
+        holds: Some(false),
+        predicted: "–".into(),
         measured: case.fitted_rate(),
         ..TheoryRow::default()
     }]
@@ -35,7 +46,8 @@ pub(super) fn rows_of_known_delay(case: &Case<'_>, law: &KnownDelay) -> Vec<Theo
     let Case { mission, network, .. } = case;
     // What was said lately is used until the next word: older by up to a message period and a control period.
     let held = mission.control_period * (mission.message_ticks + 1);
-    let turn = greatest_delay(mission).and_then(|slowest| known_delay::turn(&network.graph, law.gain, slowest + held));
+    let oldest = greatest_delay(mission).map(|slowest| slowest + held);
+    let turn = oldest.and_then(|oldest| known_delay::turn(&network.graph, law.gain, oldest));
     let below = turn.is_some_and(|turn| turn < std::f64::consts::FRAC_PI_2);
     let one_delay = common_delay(mission).is_some();
     let fixed = network.graphs.len() == 1;
@@ -47,20 +59,43 @@ pub(super) fn rows_of_known_delay(case: &Case<'_>, law: &KnownDelay) -> Vec<Theo
         (one_delay, "delays differ"),
         (whole, "messages are lost, or not said"),
         (below, "that is π/2 or more, or has no bound"),
+        (goes_as_told(case), NOT_AS_TOLD),
     ];
     let lacks: String = lacks.iter().filter(|(met, _)| !met).map(|(_, lack)| format!("; {lack}")).collect();
+    let holds = lacks.is_empty();
+    // What is used is between τ and that much older; each mode is fastest at one age, and slowest at one of the ends.
+    let ages = common_delay(mission).zip(oldest).filter(|_| holds);
+    let rate = ages.and_then(|(youngest, oldest)| {
+        let of = |age| known_delay::agreement_rate(&network.graph, law.gain, age);
+        Some(of(youngest)?.min(of(oldest)?))
+    });
     vec![TheoryRow {
         name: "Agreement with known delay".into(),
-        condition: "fixed two-way connected network, one delay τ for all links, nothing lost, kλ_max τ < π/2 = 1.571"
+        condition: "fixed two-way connected network, one delay τ for all links, nothing lost, kλ_max τ < π/2 = 1.571, type II or a kinematic vehicle along its line"
             .into(),
         value: turn
             .map_or("kλ_max τ has no bound".into(), |turn| format!("kλ_max τ = {turn:.3} with the oldest news"))
             + &lacks,
-        holds: Some(lacks.is_empty()),
-        predicted: "agreement at v_L".into(),
+        holds: Some(holds),
+        predicted: rate.map_or("–".into(), |rate| format!("agreement at v_L; ‖e‖ decays at {rate:.5} 1/s in the end")),
+        guaranteed_rate: rate,
         measured: case.fitted_rate(),
-        ..TheoryRow::default()
     }]
+}
+
+const NOT_AS_TOLD: &str = "a vehicle does not move just as told";
+
+/// Whether every ξ moves at just the rate that the law asks for: targets of type II, or kinematic vehicles that start on their lines, where
+/// they stay, undisturbed and without limits that would hold them back.
+fn goes_as_told(case: &Case<'_>) -> bool {
+    let along = |(index, plan): (usize, &VehiclePlan)| {
+        let limits = plan.limits;
+        matches!(plan.model, ModelChoice::KinematicUnicycle)
+            && case.mission.starts_along_its_path(index)
+            && limits.acceleration.is_infinite()
+            && limits.turn_rate.is_infinite()
+    };
+    moves_as_told(case.mission) || (case.disturbances.is_empty() && case.mission.vehicles.iter().enumerate().all(along))
 }
 
 /// What event-triggered talk costs at most.
@@ -74,14 +109,23 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
     let bound = greatest_delay(mission).zip(gain).and_then(|(slowest, gain)| {
         event_triggered::ultimate_bound(&network.graph, gain, trigger.floor(), (used + slowest).secs())
     });
-    let heard = network.graphs.len() == 1 && mission.loses_by_switching_only();
+    let lacks = [
+        (network.graphs.len() == 1, "the network changes"),
+        (mission.loses_by_switching_only(), "messages are lost"),
+        (mission.between == Between::Advance, "beliefs do not move on at v_L"),
+        (goes_as_told(case), NOT_AS_TOLD),
+        (bound.is_some(), "one-way links, not connected, unequal gains, or a gain too large for how old news are"),
+    ];
+    let lacks: String = lacks.iter().filter(|(met, _)| !met).map(|(_, lack)| format!("; {lack}")).collect();
     Some(TheoryRow {
         name: "Coordination error left by event-triggered talk".into(),
-        condition: "fixed two-way network, nothing lost, advance, a small gain, targets that move as told (type II)"
+        condition: "fixed two-way connected network, nothing lost, advance, a small gain, type II or a kinematic vehicle along its line"
             .into(),
-        value: format!("threshold {} in the end", trigger.floor()),
-        holds: Some(bound.is_some() && heard && mission.between == Between::Advance && moves_as_told(mission)),
-        predicted: bound.map_or("no bound".into(), |b| format!("two vehicles at most {:.4} apart", 2f64.sqrt() * b)),
+        value: format!("threshold {} in the end{lacks}", trigger.floor()),
+        holds: Some(lacks.is_empty()),
+        predicted: bound
+            .filter(|_| lacks.is_empty())
+            .map_or("–".into(), |b| format!("two vehicles at most {:.4} apart in the end", 2f64.sqrt() * b)),
         measured: case.measured(|s| format!("{:.4} in the steady part", s.fleet.coordination.steady_rms)),
         ..TheoryRow::default()
     })

@@ -7,26 +7,40 @@ use super::surroundings::undisturbed;
 use crate::results::TheoryRow;
 
 /// Path following of chapter 3 alone: conditions i and ii say that the speed must not die out.
-pub(super) fn path_following(case: &Case<'_>) -> Option<TheoryRow> {
+///
+/// Their speed is what coordination asks for, so a statement must say that the vehicles agree: else speeds may swing or grow, or die out
+/// although v_L does not.
+pub(super) fn path_following(case: &Case<'_>, statements: &[TheoryRow]) -> Option<TheoryRow> {
     let mission = case.mission;
     mission.vehicles.iter().any(|plan| chapter_3(&plan.following)).then_some(())?;
     let v_l = mission.speed.at(mission.end).v_l;
     let since = mission.speed.steps().iter().rev().take_while(|step| step.speed == 0.0).last();
+    let coordinated = speeds_settle(case, statements);
+    let mut value = match since {
+        Some(step) => format!("v_L = 0 from {} s on: vehicles may stop beside their paths", step.at.secs().max(0.0)),
+        None => format!("v_L = {v_l:.4}"),
+    };
+    if !coordinated {
+        value += "; no statement holds that makes the vehicles agree, and their speeds may do anything";
+    }
+    let holds = v_l != 0.0 && coordinated;
     let row = TheoryRow {
         name: "Path following (Propositions 3.1 to 3.3, conditions i and ii)".into(),
-        condition: "speeds do not tend to zero: v_L ≠ 0 in the end".into(),
-        value: match since {
-            Some(step) => {
-                format!("v_L = 0 from {} s on: vehicles may stop beside their paths", step.at.secs().max(0.0))
-            }
-            None => format!("v_L = {v_l:.4}"),
-        },
-        holds: Some(v_l != 0.0),
-        predicted: if v_l == 0.0 { "–".into() } else { "path-following errors vanish".into() },
+        condition: "speeds stay bounded and do not tend to zero: the vehicles agree, v_L ≠ 0 in the end".into(),
+        value,
+        holds: Some(holds),
+        predicted: if holds { "path-following errors vanish".into() } else { "–".into() },
         measured: case.measured(|s| format!("{:.3e} m off the paths at the end", s.fleet.path_error_final_m)),
         ..TheoryRow::default()
     };
     Some(undisturbed(case, row))
+}
+
+/// Whether speeds tend to v_L: nothing but v_L is asked for, or the vehicles agree.
+fn speeds_settle(case: &Case<'_>, statements: &[TheoryRow]) -> bool {
+    let alone = matches!(case.mission.law_choice, LawChoice::Alone(_)) || case.mission.vehicles.len() == 1;
+    let says = |holds: bool| statements.iter().any(|row| row.holds == Some(holds));
+    alone || (says(true) && !says(false))
 }
 
 /// Table 3.1: which following law goes with which coordination law.

@@ -5,13 +5,14 @@
 
 use common::graph::Graph;
 use common::mission::Mission;
+use common::mission::file::LawChoice;
 use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch, Watched};
 use common::time::Span;
 
 use super::network::Network;
 use super::premises::{Looked, age, looked_for, tolerance};
 use super::{Case, Guarantee, guarantee_of, law_rows};
-use crate::results::{Absence, Connectivity, Summary, TheoryRow};
+use crate::results::{Absence, Connectivity, FleetSummary, Summary, TheoryRow};
 
 /// Asked of every fleet.
 const PRESENT: &str = "every vehicle all the time";
@@ -19,22 +20,28 @@ const PRESENT: &str = "every vehicle all the time";
 /// After a flight: covered, not covered, or a defect; `None` for a fleet of one.
 pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
     let summary = case.summary.filter(|_| case.mission.vehicles.len() > 1)?;
-    let absences = &summary.fleet.absences;
-    let Some(looked) = looked_for(case.mission, &case.network) else { return Some(of_other_laws(case, absences)) };
+    let Some(looked) = looked_for(case.mission, &case.network) else { return Some(of_other_laws(case)) };
     let Some(seen) = summary.fleet.connectivity.as_ref().and_then(|measured| seen(case.mission, measured, &looked))
     else {
         return Some(nothing_seen());
     };
-    let broken = looked.broken.iter().cloned().chain(absent(absences)).collect();
+    let broken = looked.broken.iter().cloned().chain(not_there(&summary.fleet)).collect();
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
     let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
     let judged = watch.judge(&errors(summary, f64::INFINITY), tolerance);
+    let grown = match judged {
+        Judgement::Covered { statement, closest: None } => grown(case, statement),
+        _ => None,
+    };
     Some(TheoryRow {
         value: format!("{}; {}", network_words(&watch), margins(&watch)),
-        holds: Some(matches!(judged, Judgement::Covered { .. })),
+        holds: Some(matches!(judged, Judgement::Covered { .. }) && grown.is_none()),
         predicted: promise(&watch, tolerance),
         guaranteed_rate: watch.envelope.as_ref().map(|envelope| envelope.rate),
-        measured: format!("{judged}{}", before_absence(case, &looked).unwrap_or_default()),
+        measured: match grown {
+            Some(grown) => grown,
+            None => format!("{judged}{}", before_absence(case, &looked).unwrap_or_default()),
+        },
         ..empty()
     })
 }
@@ -42,9 +49,11 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
 /// What is guaranteed for the network as it was: the monitor's envelope, or what other laws' statements promise.
 pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guarantee> {
     let case = Case::new(mission, Some(summary));
-    let Some(looked) = looked_for(mission, &case.network) else { return guarantee_of(&case) };
+    let Some(looked) = looked_for(mission, &case.network) else {
+        return guarantee_of(&case).filter(|_| summary.fleet.aborted.is_empty());
+    };
     let seen = seen(mission, summary.fleet.connectivity.as_ref()?, &looked)?;
-    let broken = looked.broken.iter().cloned().chain(absent(&summary.fleet.absences)).collect();
+    let broken = looked.broken.iter().cloned().chain(not_there(&summary.fleet)).collect();
     let envelope = monitor::watch(&looked.watched, &case.network.graphs, seen, broken).envelope?;
     Some(Guarantee { rate: envelope.rate, factor: Some(envelope.factor) }).filter(|guarantee| guarantee.rate > 0.0)
 }
@@ -120,6 +129,27 @@ fn absent(absences: &[Absence]) -> Option<Premise> {
     Some(Premise { asks: PRESENT, found: format!("{}{more}", words(first)) })
 }
 
+/// The premises that vehicles which were silent at times, or gave up, do not meet.
+fn not_there(fleet: &FleetSummary) -> Vec<Premise> {
+    let gone = fleet.aborted.join(", ");
+    let gave_up = (!gone.is_empty()).then_some(Premise { asks: PRESENT, found: gone });
+    absent(&fleet.absences).into_iter().chain(gave_up).collect()
+}
+
+/// Agreement is promised without an envelope, and yet the fleet ended far beyond where it began: further apart than ten times the start
+/// and all the way that it had to go.
+fn grown(case: &Case<'_>, statement: &str) -> Option<String> {
+    let norm = &case.summary?.fleet.coordination.series.norm;
+    let (first, last) = (*norm.first()?, *norm.last()?);
+    let way = case.mission.speed.fastest() * case.mission.end.secs();
+    (!last.is_finite() || last > FAR * first + way).then(|| {
+        format!("a defect: covered by {statement}, and yet the error at the end is {last:.3e}, from {first:.3e} at the start")
+    })
+}
+
+/// How many times as far apart as at the start is far.
+const FAR: f64 = 10.0;
+
 /// What can be said of the flight before the first vehicle fell silent.
 fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
     let summary = case.summary?;
@@ -132,10 +162,11 @@ fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
 }
 
 /// A law that no statement about switching networks speaks of.
-fn of_other_laws(case: &Case<'_>, absences: &[Absence]) -> TheoryRow {
+fn of_other_laws(case: &Case<'_>) -> TheoryRow {
     let rows = law_rows(case);
     let spoken: Vec<&TheoryRow> = rows.iter().filter(|row| row.holds.is_some()).collect();
-    let absent = absent(absences);
+    let absent = case.summary.map(|summary| not_there(&summary.fleet)).unwrap_or_default();
+    let values: Vec<&str> = spoken.iter().map(|row| row.value.as_str()).collect();
     let names = spoken.iter().map(|row| row.name.as_str()).collect::<Vec<_>>().join("; ");
     let failing: Vec<String> = absent
         .iter()
@@ -147,7 +178,12 @@ fn of_other_laws(case: &Case<'_>, absences: &[Absence]) -> TheoryRow {
                 .map(|row| format!("{} asks for {}, and here: {}", row.name, row.condition, or_nothing(&row.value))),
         )
         .collect();
+    let all_hold = spoken.iter().all(|row| row.holds == Some(true)) && absent.is_empty();
+    let grown = grown(case, &names).filter(|_| all_hold && !spoken.is_empty());
+    let unspoken = matches!(case.mission.law_choice, LawChoice::DelayedEstimating(_)) && !all_hold && absent.is_empty();
     let (holds, measured) = match (spoken.is_empty(), failing.is_empty()) {
+        _ if grown.is_some() => (Some(false), grown.unwrap_or_default()),
+        _ if unspoken => (Some(false), format!("not covered: no theorem speaks of this law; {}", values.join("; "))),
         (true, true) => (None, "not covered: no statement speaks of a law without coordination".to_string()),
         (_, false) => (Some(false), format!("not covered: {}", failing.join("; "))),
         (false, true) => (Some(true), format!("covered by {names}, without an envelope")),
@@ -156,6 +192,7 @@ fn of_other_laws(case: &Case<'_>, absences: &[Absence]) -> TheoryRow {
     TheoryRow {
         value: match names.is_empty() {
             true => value,
+            _ if unspoken => value,
             false => format!("{value}; Theorems 4.4 and 4.5 do not speak of this law, but this does: {names}"),
         },
         holds,

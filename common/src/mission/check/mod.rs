@@ -181,6 +181,7 @@ mod tests {
             ("fig-3-9", include_str!("../../../../missions/thesis/fig-3-9.toml")),
             ("fig-4-2", include_str!("../../../../missions/thesis/fig-4-2.toml")),
             ("event-triggered", include_str!("../../../../missions/talk/event-triggered.toml")),
+            ("bounded", include_str!("../../../../missions/talk/bounded.toml")),
             ("naive", include_str!("../../../../missions/talk/naive.toml")),
             ("known-delay", include_str!("../../../../missions/talk/known-delay.toml")),
             ("estimated-speed", include_str!("../../../../missions/talk/estimated-speed.toml")),
