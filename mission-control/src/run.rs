@@ -296,8 +296,12 @@ impl Processes {
             let _ = processes.end();
             let log = logs.join("network-emulator.log");
             let said = fs::read_to_string(&log).unwrap_or_default();
-            let last = said.lines().last().unwrap_or("it said nothing").to_string();
-            Failure::Unreachable(format!("the network-emulator did not come up: {last}"))
+            let last = said.lines().last().unwrap_or("it said nothing");
+            // Without instant and level: of the line in its log.
+            let why = last.split_once("ERROR ").map_or(last, |(_, why)| why).to_string();
+            // What it said is told; a folder with nothing else in it need not stay.
+            let _ = fs::remove_file(&log);
+            Failure::Unreachable(format!("the network-emulator did not come up: {why}"))
         })?;
         bus::remark!("network-emulator listens on {endpoint}; another terminal can use --attach {endpoint}");
         for vehicle in &mission.vehicles {

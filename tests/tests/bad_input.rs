@@ -134,7 +134,9 @@ fn a_port_in_use_is_exit_code_3() {
     let mut control = ground.control(&["run", mission, "--listen", &endpoint, "--out", "run"]);
     control.ends_with(3);
     let said = control.stderr();
-    assert!(said.lines().last().is_some_and(|line| line.contains(&endpoint) && line.contains("in use")), "{said}");
+    let last = said.lines().last().expect("a line");
+    assert!(last.contains(&endpoint) && last.contains("in use") && !last.contains("ERROR"), "{said}");
+    assert!(!ground.path("run").exists(), "nothing was flown");
 }
 
 #[test]
