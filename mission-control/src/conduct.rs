@@ -14,6 +14,8 @@ use vehicle_node::node::STOPPED;
 
 /// Between two questions after the fleet's status.
 const POLL: Span = Span::from_nanos(200_000_000);
+/// Why a log is missing that there never was.
+pub(crate) const NO_LOG: &str = "it has no log of this mission";
 /// A piece of a log that has not come after this long is asked for again.
 const PIECE_PATIENCE: Span = Span::from_nanos(3_000_000_000);
 /// How often the same piece is asked for before the log is given up.
@@ -352,7 +354,7 @@ impl Conduct {
             wanted.offset = 0;
         }
         if piece.files == 0 {
-            self.missing.push((who.to_string(), "it has no log of this mission".to_string()));
+            self.missing.push((who.to_string(), NO_LOG.to_string()));
         } else {
             self.outputs.push_back(ConductOutput::Log { who: who.to_string(), piece });
         }

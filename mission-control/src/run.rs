@@ -24,7 +24,7 @@ use common::wire::{self, GarbageCount};
 use network_emulator::hub::{COLLECTOR, HUB};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
+use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, NO_LOG, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
 use crate::results::{ClockSummary, Summary};
@@ -156,6 +156,7 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     if phase != Phase::Finished {
         processes.terminate();
     }
+    let nobody_has_one = missing.iter().all(|(_, why)| why == NO_LOG);
     let mut missing: Vec<String> = missing.into_iter().map(|(who, why)| format!("log of {who}: {why}")).collect();
     missing.extend(processes.end());
 
@@ -163,8 +164,10 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     if logs.is_empty() {
         let why = format!("nothing was recorded: {}", missing.join(", "));
         if let Some(line) = line {
-            // Nor will there ever be: the next run of the mission must not look for it again.
-            let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
+            if nobody_has_one {
+                // Nor will there ever be: the next run of the mission must not look for it again.
+                let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
+            }
             line.close();
             discard(&folder);
             return Err(Failure::Files(why));

@@ -77,6 +77,27 @@ fn conduct(ground: &Ground, endpoint: &str, out: &str) -> Process {
     ground.control(&["run", "mission.toml", "--attach", endpoint, "--speed-up", "10", "--out", out])
 }
 
+/// A run that waits for the last of its vehicles.
+struct Waiting {
+    ground: Ground,
+    endpoint: String,
+    emulator: Process,
+    vehicles: [Process; 2],
+    control: Process,
+}
+
+impl Waiting {
+    fn for_c() -> Waiting {
+        let ground = Ground::new();
+        ground.file("mission.toml", &mission_text(MISSION));
+        let (emulator, endpoint) = ground.emulator(&lasting_endpoint());
+        let vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
+        let control = conduct(&ground, &endpoint, "run");
+        until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+        Waiting { ground, endpoint, emulator, vehicles, control }
+    }
+}
+
 /// Asserts that a vehicle flew from the start to the end.
 fn assert_flown(rows: &[&StateRow], end_s: f64) {
     let (first, last) = (rows[0].t_ns as f64 / 1e9, rows[rows.len() - 1].t_ns as f64 / 1e9);
@@ -283,12 +304,7 @@ fn a_flight_that_ended_unwatched_is_collected_and_called_so() {
 
 #[test]
 fn a_flight_that_is_stopped_while_it_waits_for_a_vehicle_ends() {
-    let ground = Ground::new();
-    ground.file("mission.toml", &mission_text(MISSION));
-    let (_emulator, endpoint) = ground.emulator("tcp/127.0.0.1:0");
-    let _vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
-    let mut control = conduct(&ground, &endpoint, "run");
-    until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+    let Waiting { ground, endpoint, emulator: _emulator, mut control, vehicles: _vehicles } = Waiting::for_c();
     // Another one of its kind waits behind it for a while, and says so.
     let mut queued = conduct(&ground, &endpoint, "queued");
     queued.ends_with(3);
@@ -311,12 +327,7 @@ fn a_flight_that_is_stopped_while_it_waits_for_a_vehicle_ends() {
 
 #[test]
 fn an_emulator_that_is_killed_before_the_start_gets_the_mission_again() {
-    let ground = Ground::new();
-    ground.file("mission.toml", &mission_text(MISSION));
-    let (mut emulator, endpoint) = ground.emulator(&lasting_endpoint());
-    let _vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
-    let mut control = conduct(&ground, &endpoint, "run");
-    until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+    let Waiting { ground, endpoint, mut emulator, mut control, vehicles: _vehicles } = Waiting::for_c();
     emulator.kill();
     let (_emulator, _) = ground.emulator(&endpoint);
     let _c = ground.vehicle("c", &endpoint);
@@ -328,12 +339,7 @@ fn an_emulator_that_is_killed_before_the_start_gets_the_mission_again() {
 
 #[test]
 fn a_run_that_is_left_before_its_start_says_so_and_leaves_nothing() {
-    let ground = Ground::new();
-    ground.file("mission.toml", &mission_text(MISSION));
-    let (_emulator, endpoint) = ground.emulator("tcp/127.0.0.1:0");
-    let _vehicles = ["a", "b"].map(|id| ground.vehicle(id, &endpoint));
-    let mut control = conduct(&ground, &endpoint, "run");
-    until(PATIENCE, "it says whom it waits for", || control.stderr().contains("c (not connected)"));
+    let Waiting { ground, emulator: _emulator, mut control, vehicles: _vehicles, .. } = Waiting::for_c();
     control.terminate();
     control.ends_with(1);
     let said = control.stderr();
