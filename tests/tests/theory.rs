@@ -479,6 +479,37 @@ fn the_rate_of_a_known_delay_stands_beside_the_flight() {
 }
 
 #[test]
+fn delays_of_their_own_on_every_link_are_covered() {
+    const NAME: &str = "known delay";
+    let text = mission_text("missions/talk/known-delay.toml");
+    let row_of = |rows: Vec<TheoryRow>| rows.into_iter().find(|row| row.name.contains(NAME)).expect("a row");
+    // As shipped: not the same both ways, and one varies.
+    let (rows, summary) = fly(&text);
+    let row = row_of(rows);
+    assert!(row.holds == Some(true) && row.predicted == "agreement at v_L", "{row:?}");
+    assert!(row.value.contains("delays of any kind: k‖T‖ = 0."), "{row:?}");
+    assert!(summary.fleet.coordination.last < 1e-3 && (summary.fleet.steady_speed - 0.5).abs() < 1e-4);
+    // Constant, and the same both ways: a rate.
+    let from = text.find("exceptions").expect("delays that differ");
+    let to = text.find("[fleet]").expect("a fleet");
+    let two = "exceptions = [\n  { from = \"b\", to = \"a\", delay = { constant = { delay_s = 2.0 } } },\n  \
+               { from = \"a\", to = \"b\", delay = { constant = { delay_s = 2.0 } } },\n]\n\n";
+    let alike = with(&text, &text[from..to], two);
+    let (rows, summary) = fly(&alike);
+    let row = row_of(rows);
+    let guaranteed = row.guaranteed_rate.expect("a rate");
+    let fit = summary.fleet.coordination.fit.expect("it decays");
+    assert!(row.value.contains("delays alike both ways: kλ_max τ = 0.772"), "{row:?}");
+    assert!(guaranteed > 0.02 && fit.rate > guaranteed, "{} {guaranteed}", fit.rate);
+    // Where the premises end.
+    assert_broken(&with(&text, "gain = 0.05", "gain = 0.09"), NAME, "k‖T‖ = 1.1");
+    assert_broken(&with(&text, "longest_s = 20.0", "longest_s = 5.1"), NAME, "do not count");
+    assert_broken(&with(&text, "message_period_s = 0.1", "message_period_s = 0.1\nvalidity_s = 2.0"), NAME, "pauses");
+    let normal = with(&text, "jittered = { min_s = 1.0, max_s = 4.0 }", "normal = { mean_s = 2.0, deviation_s = 0.2 }");
+    assert_broken(&normal, NAME, "a delay has no bound");
+}
+
+#[test]
 fn the_bound_of_talk_by_event_holds_for_kinematic_vehicles_along_their_lines() {
     const NAME: &str = "event-triggered talk";
     let text = mission_text("missions/talk/bounded.toml");

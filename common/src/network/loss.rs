@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::TwoStates;
+use super::{SharedFades, TwoStates};
 use crate::random::{LANES, Stream};
 
 /// Lane of the numbers of a message that decides a plain loss.
@@ -22,19 +22,8 @@ pub enum Loss {
         /// Probability that a message in a gap is lost.
         in_gap: f64,
     },
-    /// Fades that all links share: a link follows the common fade with probability `correlation`, and one of its own,
-    /// alike in the mean, otherwise. Each message is lost with the share of fades, whatever the correlation; the losses
-    /// of two links have correlation `correlation`².
-    SharedFades {
-        /// The common fade.
-        common: TwoStates,
-        /// The stream of the common fade, the same for all links.
-        common_stream: Box<Stream>,
-        /// The link's own.
-        own: TwoStates,
-        /// 0 to 1.
-        correlation: f64,
-    },
+    /// Fades that links share.
+    SharedFades(SharedFades),
     /// As recorded: message m is lost if `lost[m mod length]`.
     Trace(Arc<[bool]>),
 }
@@ -48,14 +37,7 @@ impl Loss {
                 let probability = if states.in_burst(stream, number, drawn) { *in_burst } else { *in_gap };
                 drawn[LOSS] < probability
             }
-            Loss::SharedFades { common, common_stream, own, correlation } => {
-                if drawn[LOSS] < *correlation {
-                    let drawn = common_stream.units_at(number);
-                    common.in_burst(common_stream, number, &drawn)
-                } else {
-                    own.in_burst(stream, number, drawn)
-                }
-            }
+            Loss::SharedFades(fades) => fades.in_fade(stream, number, drawn),
             Loss::Trace(lost) => !lost.is_empty() && lost[(number % lost.len() as u64) as usize],
         }
     }
@@ -65,7 +47,7 @@ impl Loss {
         match self {
             Loss::Bernoulli(probability) => *probability,
             Loss::Bursts { states, in_burst, in_gap } => states.share() * in_burst + (1.0 - states.share()) * in_gap,
-            Loss::SharedFades { common, .. } => common.share(),
+            Loss::SharedFades(fades) => fades.share(),
             Loss::Trace(lost) => lost.iter().filter(|lost| **lost).count() as f64 / lost.len().max(1) as f64,
         }
     }
@@ -95,7 +77,7 @@ mod tests {
         for (loss, share, burst) in [
             (Loss::Bernoulli(0.3), 0.3, 1.0 / 0.7),
             (Loss::Bursts { states: TwoStates::new(5.0, 15.0), in_burst: 0.8, in_gap: 0.1 }, 0.275, 5.0),
-            (shared(0.2, 6.0, 0.5), 0.2, 6.0),
+            (Loss::SharedFades(SharedFades::new(0.2, 6.0, 0.5, Stream::new(9, "fades"))), 0.2, 6.0),
             (Loss::Trace([true, false, false, false].into()), 0.25, 1.0),
         ] {
             assert!((loss.mean() - share).abs() < 1e-9, "{loss:?}");
@@ -103,33 +85,6 @@ mod tests {
             let bound = 5.0 * (share * (1.0 - share) * 2.0 * burst / n as f64).sqrt();
             let found = mean(&lost(&loss, "a", n));
             assert!((found - share).abs() < bound, "{found} for {share} ± {bound}");
-        }
-    }
-
-    fn shared(share: f64, burst: f64, correlation: f64) -> Loss {
-        let states = TwoStates::with_share(share, burst);
-        Loss::SharedFades {
-            common: states.clone(),
-            common_stream: Box::new(Stream::new(9, "fades")),
-            own: states,
-            correlation,
-        }
-    }
-
-    #[test]
-    fn losses_of_two_links_are_as_correlated_as_told() {
-        let (n, share, burst) = (200_000, 0.3, 3.0);
-        // With z = (x − p)/√(pq), the estimate is the mean of products z_a z_b: each has a variance of at most E z⁴ = 1/pq − 3,
-        // and k messages apart they are correlated by at most ρ^k, ρ = 1 − 1/burst − 1/gap.
-        let (variance, gap) = (share * (1.0 - share), burst * (1.0 - share) / share);
-        let rho = 1.0 - 1.0 / burst - 1.0 / gap;
-        let bound = 5.0 * ((1.0 / variance - 3.0) * (1.0 + rho) / (1.0 - rho) / n as f64).sqrt();
-        for correlation in [0.0, 0.5, 1.0] {
-            let loss = shared(share, burst, correlation);
-            let (a, b) = (lost(&loss, "a", n), lost(&loss, "b", n));
-            let both = mean(&a.iter().zip(&b).map(|(a, b)| a * b).collect::<Vec<_>>());
-            let found = (both - mean(&a) * mean(&b)) / variance;
-            assert!((found - correlation * correlation).abs() < bound, "{found} for {}", correlation * correlation);
         }
     }
 

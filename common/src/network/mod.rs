@@ -8,6 +8,7 @@
 //! | [`Delay`] | constant, uniform, normal, gamma, from distance | any text; Mukherjee 1994 for the shifted gamma | [`mod@delay`] |
 //! | [`Quantiles`] | one uniform number in, one of any density out | inversion | [`quantiles`] |
 //! | [`Loss`] | Bernoulli, bursts, fades shared by links, a trace | Gilbert 1960, Elliott 1963 | [`mod@loss`] |
+//! | [`SharedFades`] | fades of several links, as correlated as told | common shocks, Marshall and Olkin 1967 | [`shared_fades`] |
 //! | [`TwoStates`] | bursts and gaps by message number | two-state Markov chain, its regeneration | [`two_states`] |
 //! | [`Range`] | heard within a distance, or with a probability over it | hard disc; measured success curves | [`mod@range`] |
 //! | [`Medium`] | airtime, queue, slots, duty cycle, collisions, half duplex | ALOHA, TDMA; ETSI EN 300 220 for the duty cycle | [`medium`] |
@@ -21,6 +22,7 @@ pub mod loss;
 pub mod medium;
 pub mod quantiles;
 pub mod range;
+pub mod shared_fades;
 pub mod two_states;
 pub mod whereabouts;
 
@@ -29,5 +31,6 @@ pub use loss::Loss;
 pub use medium::Medium;
 pub use quantiles::Quantiles;
 pub use range::Range;
+pub use shared_fades::SharedFades;
 pub use two_states::TwoStates;
 pub use whereabouts::Whereabouts;

@@ -14,11 +14,11 @@
 use crate::random::{LANES, Stream};
 
 /// Furthest back that a renewal is looked for; beyond it the state is taken from π.
-const FURTHEST: u64 = 100_000;
+pub(super) const FURTHEST: u64 = 100_000;
 
 /// Lanes of the stream: whether the message renews the state, and to what.
-const RENEWS: usize = 6;
-const STATE: usize = 7;
+pub(super) const RENEWS: usize = 6;
+pub(super) const STATE: usize = 7;
 
 /// Bursts and gaps over message numbers.
 #[derive(Clone, Debug)]
@@ -36,11 +36,6 @@ impl TwoStates {
     pub fn new(burst: f64, gap: f64) -> TwoStates {
         let share = if gap.is_finite() { burst / (burst + gap) } else { 0.0 };
         TwoStates { renewal: (1.0 / burst + 1.0 / gap).clamp(0.0, 1.0), share, last: None }
-    }
-
-    /// Bursts of `burst` messages in the mean, with this share of all messages in one.
-    pub fn with_share(share: f64, burst: f64) -> TwoStates {
-        TwoStates::new(burst, burst * (1.0 - share) / share)
     }
 
     /// The long-run share of messages in a burst.
@@ -110,7 +105,7 @@ mod tests {
     #[test]
     fn with_independent_losses_it_is_bernoulli() {
         // Burst 1/(1 − p) and gap 1/p are those of independent losses; then λ = 0 and every message renews.
-        let chain = TwoStates::with_share(0.25, 4.0 / 3.0);
+        let chain = TwoStates::new(4.0 / 3.0, 4.0);
         assert!((chain.renewal - 1.0).abs() < 1e-12 && (chain.share() - 0.25).abs() < 1e-12);
     }
 

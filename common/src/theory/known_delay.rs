@@ -8,8 +8,8 @@
 //! ```
 //!
 //! (a pair: λ = 2). All roots are to the left iff aτ < π/2: with s = jω, |ω| = a and ωτ = π/2. The fleet agrees iff
-//! kλ_max τ < π/2. A delay that varies, the same for all links, is harmless as long as kλ_max τ stays below 3/2 (Yorke);
-//! for delays that differ from link to link nothing is claimed here.
+//! kλ_max τ < π/2. A delay that varies, the same for all links, is harmless as long as kλ_max τ stays below 3/2 (Yorke).
+//! Delays that differ from link to link: [`known_delay_by_link`](super::known_delay_by_link).
 
 use std::f64::consts::{E, FRAC_PI_2, PI};
 

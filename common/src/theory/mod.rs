@@ -14,6 +14,7 @@
 //! | connected in mean | Theorems 4.2, 4.5; erratum 4.7 | agreement, with a rate proven here | [`theorem_4_5`] |
 //! | event-triggered talk | this project; (4.21) with beliefs | ‖γ~‖ in the end below √n‖ΠA‖/λ_2 times the error of a belief | [`event_triggered`] |
 //! | known delay | this project | agreement at v_L iff kλ_max τ < π/2, with its rate | [`known_delay`] |
+//! | known delays that differ from link to link | this project | agreement if kλ_max τ < π/2 (alike both ways, with a rate), or if k‖T‖ < 1 | [`known_delay_by_link`] |
 //! | late information | Theorem 4.3, Lemmas 4.4, 4.5; errata 4.1–4.3 | agreement at v_L* = v_L/(1 + kτ) | [`delay`] |
 //! | how fast, on a fixed network | (4.40) | the rightmost root | [`delay_rate`] |
 //! | coordination with a state of its own | Lemmas 4.2, 4.6, 4.7, Theorem 4.9, (4.63)–(4.66); errata 4.19, 4.20 | V at (1 − α)λ_c − αλ_d, norms at half | [`lemma_4_6`] |
@@ -33,6 +34,7 @@ pub mod delay_rate;
 pub mod event_triggered;
 pub mod gateway_2_35;
 pub mod known_delay;
+pub mod known_delay_by_link;
 pub mod lemma_1_1;
 pub mod lemma_4_6;
 pub mod linear_coordination;

@@ -1,8 +1,12 @@
 //! Known and estimated delays, and talk by event.
 
+use std::f64::consts::FRAC_PI_2;
+
+use common::graph::Graph;
 use common::mission::file::{Between, DelayedEstimating, KnownDelay, LawChoice, ModelChoice};
 use common::mission::{Link, Mission, VehiclePlan};
 use common::network::Delay;
+use common::theory::known_delay_by_link::{self, Late};
 use common::theory::{delay, event_triggered, known_delay};
 use common::time::Span;
 
@@ -44,43 +48,103 @@ pub(super) fn rows_of_estimating(case: &Case<'_>, law: &DelayedEstimating) -> Ve
 /// The law that compares what is of the same age.
 pub(super) fn rows_of_known_delay(case: &Case<'_>, law: &KnownDelay) -> Vec<TheoryRow> {
     let Case { mission, network, .. } = case;
-    // What was said lately is used until the next word: older by up to a message period and a control period.
-    let held = mission.control_period * (mission.message_ticks + 1);
-    let oldest = greatest_delay(mission).map(|slowest| slowest + held);
-    let turn = oldest.and_then(|oldest| known_delay::turn(&network.graph, law.gain, oldest));
-    let below = turn.is_some_and(|turn| turn < std::f64::consts::FRAC_PI_2);
-    let one_delay = common_delay(mission).is_some();
-    let fixed = network.graphs.len() == 1;
+    let late = oldest_news(mission);
+    let statement = late.as_deref().map(|late| of_delays(mission, &network.graph, law.gain, late));
     let connected = network.graph.is_undirected() && network.graph.is_connected();
     let whole = mission.talk.is_none() && mission.loses_by_switching_only();
     let lacks = [
-        (fixed, "the network changes"),
+        (network.graphs.len() == 1, "the network changes"),
         (connected, "one-way links, or not connected"),
-        (one_delay, "delays differ"),
         (whole, "messages are lost, or not said"),
-        (below, "that is π/2 or more, or has no bound"),
+        (late.is_some(), "a delay has no bound"),
+        (
+            late.iter().flatten().all(|link| link.oldest.secs() <= law.longest_s),
+            "news older than longest_s do not count",
+        ),
+        (
+            mission.validity.is_none_or(|validity| longest_pause(mission) <= validity),
+            "validity_s is shorter than pauses between messages",
+        ),
+        (statement.as_ref().is_none_or(|statement| statement.value < statement.limit), "that is too much"),
         (goes_as_told(case), NOT_AS_TOLD),
     ];
     let lacks: String = lacks.iter().filter(|(met, _)| !met).map(|(_, lack)| format!("; {lack}")).collect();
     let holds = lacks.is_empty();
-    // What is used is between τ and that much older; each mode is fastest at one age, and slowest at one of the ends.
-    let ages = common_delay(mission).zip(oldest).filter(|_| holds);
-    let rate = ages.and_then(|(youngest, oldest)| {
-        let of = |age| known_delay::agreement_rate(&network.graph, law.gain, age);
-        Some(of(youngest)?.min(of(oldest)?))
+    let rate = statement.as_ref().and_then(|statement| statement.rate).filter(|_| holds);
+    let value = statement.as_ref().map_or("–".into(), |statement| {
+        format!("{}: {} = {:.3} with the oldest news", statement.delays, statement.quantity, statement.value)
+    });
+    let asked = statement.as_ref().map_or("a bound on every delay".into(), |statement| {
+        format!("{} < {}", statement.quantity, statement.limit_in_words)
     });
     vec![TheoryRow {
         name: "Agreement with known delay".into(),
-        condition: "fixed two-way connected network, one delay τ for all links, nothing lost, kλ_max τ < π/2 = 1.571, type II or a kinematic vehicle along its line"
-            .into(),
-        value: turn
-            .map_or("kλ_max τ has no bound".into(), |turn| format!("kλ_max τ = {turn:.3} with the oldest news"))
-            + &lacks,
+        condition: format!(
+            "fixed two-way connected network, nothing lost, {asked}, type II or a kinematic vehicle along its line"
+        ),
+        value: value + &lacks,
         holds: Some(holds),
-        predicted: rate.map_or("–".into(), |rate| format!("agreement at v_L; ‖e‖ decays at {rate:.5} 1/s in the end")),
+        predicted: match rate {
+            _ if !holds => "–".into(),
+            Some(rate) => format!("agreement at v_L; ‖e‖ decays at {rate:.5} 1/s at least in the end"),
+            None => "agreement at v_L".into(),
+        },
         guaranteed_rate: rate,
         measured: case.fitted_rate(),
     }]
+}
+
+/// What is known of delays like a mission's.
+struct OfDelays {
+    delays: &'static str,
+    quantity: &'static str,
+    value: f64,
+    limit: f64,
+    limit_in_words: &'static str,
+    rate: Option<f64>,
+}
+
+/// One delay, delays alike both ways, or any: the sharpest statement that speaks of them.
+fn of_delays(mission: &Mission, graph: &Graph, gain: f64, late: &[Late]) -> OfDelays {
+    let oldest = late.iter().map(|link| link.oldest).max().unwrap_or(Span::ZERO);
+    let turn = OfDelays {
+        delays: "one delay",
+        quantity: "kλ_max τ",
+        value: known_delay::turn(graph, gain, oldest).unwrap_or(f64::INFINITY),
+        limit: FRAC_PI_2,
+        limit_in_words: "π/2",
+        rate: None,
+    };
+    let constant = mission.links.iter().all(|link| link.fixed_delay().is_some());
+    match common_delay(mission) {
+        // What is used is between τ and that much older; each mode is fastest at one age, and slowest at one of the ends.
+        Some(youngest) => {
+            let of = |age| known_delay::agreement_rate(graph, gain, age);
+            OfDelays { rate: of(youngest).zip(of(oldest)).map(|(one, other)| one.min(other)), ..turn }
+        }
+        None if constant && known_delay_by_link::is_alike_both_ways(late) => OfDelays {
+            delays: "delays alike both ways",
+            rate: known_delay_by_link::rate_at_least(graph, gain, oldest),
+            ..turn
+        },
+        None => OfDelays {
+            delays: "delays of any kind",
+            quantity: "k‖T‖",
+            value: known_delay_by_link::loop_gain(graph.len(), gain, late),
+            limit: 1.0,
+            limit_in_words: "1",
+            rate: None,
+        },
+    }
+}
+
+/// How old what is used of a neighbour can become on every link, if there is a bound: what was said lately is used until the next word, so it
+/// grows older by up to a message period and a control period.
+fn oldest_news(mission: &Mission) -> Option<Vec<Late>> {
+    let held = mission.control_period * (mission.message_ticks + 1);
+    let of =
+        |link: &Link| Some(Late { to: link.to, from: link.from, oldest: greatest_delay_of(mission, link)? + held });
+    mission.links.iter().map(of).collect()
 }
 
 const NOT_AS_TOLD: &str = "a vehicle does not move just as told";
@@ -137,18 +201,30 @@ pub(super) fn common_delay(mission: &Mission) -> Option<Span> {
     mission.every_message_takes(first).then_some(first)
 }
 
+/// The longest time between two arrivals on a link, of delays that have a bound.
+fn longest_pause(mission: &Mission) -> Span {
+    let spread = |delay: &Delay| match delay {
+        Delay::Uniform(least, greatest) => Span::from_nanos(greatest.nanos() - least.nanos()),
+        _ => Span::ZERO,
+    };
+    let of_link = |link: &Link| link.layers.iter().fold(Span::ZERO, |sum, layer| sum + spread(&layer.delay));
+    mission.control_period * mission.message_ticks + mission.links.iter().map(of_link).max().unwrap_or(Span::ZERO)
+}
+
 /// The greatest delay that a message can have, if there is one.
 fn greatest_delay(mission: &Mission) -> Option<Span> {
-    let of_link = |link: &Link| {
-        link.layers.iter().try_fold(Span::ZERO, |sum, layer| match &layer.delay {
-            Delay::Constant(delay) | Delay::Uniform(_, delay) => Some(sum + *delay),
-            _ => None,
-        })
-    };
+    mission.links.iter().try_fold(Span::ZERO, |greatest, link| Some(greatest.max(greatest_delay_of(mission, link)?)))
+}
+
+/// The same on one link.
+fn greatest_delay_of(mission: &Mission, link: &Link) -> Option<Span> {
     if mission.medium.is_some() {
         return None;
     }
-    mission.links.iter().try_fold(Span::ZERO, |greatest, link| Some(greatest.max(of_link(link)?)))
+    link.layers.iter().try_fold(Span::ZERO, |sum, layer| match &layer.delay {
+        Delay::Constant(delay) | Delay::Uniform(_, delay) => Some(sum + *delay),
+        _ => None,
+    })
 }
 
 /// The speed at which the fleet will travel, as a part of v_L, if theory knows it.

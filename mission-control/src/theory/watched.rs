@@ -84,7 +84,9 @@ pub fn envelope_over(
         shortest_up: dwell,
         unheard: (period.secs() / dwell.secs().max(1e-9)).min(1.0),
     };
-    let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: None, exchange: Some(exchange) };
+    // By (4.11) an outage of length l has l ≤ αl + (1 − α)T_0, so none is longer than T_0, and every window of that length sees the fleet
+    // connected: Definition 4.4 with T = T_0.
+    let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: Some(t_0), exchange: Some(exchange) };
     let watch = monitor::watch(&looked.watched, graphs, seen, looked.broken);
     let tolerance = tolerance(mission, graphs, &watch, &looked.watched);
     let envelope = watch.envelope.ok_or_else(|| watch.judge(&[], Tolerance::default()).to_string())?;

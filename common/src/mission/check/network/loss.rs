@@ -2,7 +2,7 @@
 
 use super::super::super::fault::Collector;
 use super::super::super::file::LossChoice;
-use crate::network::{Loss, TwoStates};
+use crate::network::{Loss, SharedFades, TwoStates};
 use crate::random::Stream;
 
 /// Longest mean burst or gap, and longest recorded trace \[messages\].
@@ -51,9 +51,8 @@ pub(super) fn check(faults: &mut Collector<'_>, key: &str, loss: &LossChoice, se
                 let burst_ok = f.mean_burst >= least - 1e-9;
                 faults.number(&format!("{key}.mean_burst"), f.mean_burst, burst_ok, &allowed);
             }
-            let own = TwoStates::with_share(f.probability, f.mean_burst);
-            let common_stream = Box::new(Stream::new(seed, FADES));
-            Some(Loss::SharedFades { common: own.clone(), common_stream, own, correlation: f.correlation })
+            let common = Stream::new(seed, FADES);
+            Some(Loss::SharedFades(SharedFades::new(f.probability, f.mean_burst, f.correlation, common)))
         }
         LossChoice::Trace(trace) => {
             let key = format!("{key}.trace.runs");

@@ -49,7 +49,7 @@ pub struct SharedFades {
     pub probability: f64,
     /// Mean length of a fade (messages).
     pub mean_burst: f64,
-    /// Probability that a link follows the common fade and not one of its own, 0 to 1.
+    /// Correlation of the losses of any two links, 0 to 1.
     #[serde(default = "certain")]
     pub correlation: f64,
 }
