@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use common::graph::{Graph, measure};
 use common::record::{Fate, MessageRow, Record};
+use common::time::{Span, Time};
 use serde::Serialize;
 
 use super::Facts;
@@ -95,7 +97,7 @@ pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<L
         let rows = messages.get(&(from, to)).map_or(&[][..], Vec::as_slice);
         let summary = ledger(rows, facts.bytes_of(from));
         let down = network.down_times(from, to);
-        let duration = network.end_s - network.start_s;
+        let duration = network.end.secs();
         let down_s: f64 = down.iter().map(|(from, to)| to - from).sum();
         LinkSummary {
             from: from.to_owned(),
@@ -177,12 +179,10 @@ fn was_on_air(row: &MessageRow) -> bool {
 /// The links over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Network {
-    /// Start of the observation \[s\].
-    pub start_s: f64,
-    /// Its end \[s\].
-    pub end_s: f64,
-    /// Instants of changes \[s\] for each link, with the new state.
-    changes: BTreeMap<(String, String), Vec<(f64, bool)>>,
+    /// The end of the observation, which begins at zero.
+    end: Time,
+    /// For each link, the instants at which it changed, in order, with whether it was up from then on.
+    changes: BTreeMap<(String, String), Vec<(Time, bool)>>,
 }
 
 /// Connectivity over time, measured as the theory of chapter 4 wants it.
@@ -241,36 +241,37 @@ impl Network {
     /// The links over \[0, `duration`\]. A link whose first change is to go down was up before, and a link of which
     /// nothing is said was up all the time.
     pub fn of(exact: &[Record], facts: &Facts) -> Network {
-        let mut changes: BTreeMap<(String, String), Vec<(f64, bool)>> = BTreeMap::new();
+        let end = Time::from_secs(facts.duration_s);
+        let mut changes: BTreeMap<(String, String), Vec<(Time, bool)>> = BTreeMap::new();
         for link in &facts.links {
             changes.entry(link.clone()).or_default();
         }
         for record in exact {
             if let Record::Topology(row) = record {
-                let at = (row.t_ns as f64 / 1e9).clamp(0.0, facts.duration_s);
+                let at = Time::from_nanos(row.t_ns).clamp(Time::ZERO, end);
                 changes.entry((row.from.to_string(), row.to.to_string())).or_default().push((at, row.up));
             }
         }
-        changes.values_mut().for_each(|changes| changes.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        Network { start_s: 0.0, end_s: facts.duration_s, changes }
+        changes.values_mut().for_each(|changes| changes.sort_by_key(|(at, _)| *at));
+        Network { end, changes }
     }
 
     /// When a link was down, as intervals (from, to) \[s\].
     pub fn down_times(&self, from: &str, to: &str) -> Vec<(f64, f64)> {
         let changes = self.changes.get(&(from.to_owned(), to.to_owned())).map_or(&[][..], Vec::as_slice);
-        let mut since = changes.first().filter(|first| first.1).map(|_| self.start_s);
+        let mut since = changes.first().filter(|first| first.1).map(|_| 0.0);
         let mut down = Vec::new();
         for (at, up) in changes {
             match (since, up) {
                 (Some(start), true) => {
-                    down.push((start, *at));
+                    down.push((start, at.secs()));
                     since = None;
                 }
-                (None, false) => since = Some(*at),
+                (None, false) => since = Some(at.secs()),
                 _ => {}
             }
         }
-        down.extend(since.map(|start| (start, self.end_s)));
+        down.extend(since.map(|start| (start, self.end.secs())));
         down.retain(|(from, to)| to > from);
         down
     }
@@ -290,65 +291,83 @@ impl Network {
 
     /// The measured connectivity; `None` for fewer than two vehicles or no time.
     pub fn connectivity(&self, facts: &Facts) -> Option<Connectivity> {
-        let count = facts.vehicles.len();
-        let pieces = self.pieces(facts);
-        if count < 2 || pieces.is_empty() {
+        let measured = self.measured(facts);
+        let length = measured.length();
+        if facts.vehicles.len() < 2 || length <= Span::ZERO {
             return None;
         }
-        let connected: Vec<bool> = pieces.iter().map(|piece| has_root(count, &piece.edges)).collect();
-        let lost = |index: usize| if connected[index] { 0.0 } else { pieces[index].length_s };
-        let alpha = (0..pieces.len()).map(lost).sum::<f64>() / (self.end_s - self.start_s);
-        // T_0 from the largest rise of ∫(p − α) between two instants.
-        let (mut value, mut lowest, mut rise) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for (index, piece) in pieces.iter().enumerate() {
-            value += lost(index) - alpha * piece.length_s;
-            lowest = lowest.min(value);
-            rise = rise.max(value - lowest);
-        }
-        let t_0_s = (alpha < 1.0).then(|| rise / (1.0 - alpha));
-        let length_s = self.end_s - self.start_s;
+        let alpha = measured.loss_fraction();
         Some(Connectivity {
             alpha,
-            t_0_s,
-            t_s: union_period(count, &pieces, &connected),
-            length_s,
-            dwell_s: dwell(&pieces).unwrap_or(length_s),
-            shortest_up_s: length_s,
+            t_0_s: (alpha < 1.0).then(|| measured.t_0(alpha).secs()),
+            t_s: measured.connected_in_mean().map(Span::secs),
+            length_s: length.secs(),
+            dwell_s: measured.dwell().unwrap_or(length).secs(),
+            shortest_up_s: length.secs(),
             oldest_news_s: None,
             unheard: 0.0,
         })
     }
 
+    /// The graph of who hears whom, measured over the run.
+    fn measured(&self, facts: &Facts) -> measure::Connectivity {
+        let numbers = facts.vehicles.iter().zip(0..).map(|(vehicle, number)| (vehicle.id.as_str(), number));
+        let numbers: BTreeMap<&str, usize> = numbers.collect();
+        let mut graph = Graph::empty(facts.vehicles.len());
+        let mut events: Vec<(Time, usize, usize, bool)> = Vec::new();
+        for ((from, to), changes) in &self.changes {
+            let (Some(&sender), Some(&receiver)) = (numbers.get(from.as_str()), numbers.get(to.as_str())) else {
+                continue;
+            };
+            graph.set(receiver, sender, changes.first().is_none_or(|(_, up)| !up));
+            events.extend(changes.iter().map(|(at, up)| (*at, receiver, sender, *up)));
+        }
+        events.sort_by_key(|(at, ..)| *at);
+        // What changes at the begin was so from the begin, and what changes at the end was never seen.
+        let begun = events.partition_point(|(at, ..)| *at <= Time::ZERO);
+        let over = events.partition_point(|(at, ..)| *at < self.end).max(begun);
+        let mut measured = measure::Connectivity::new();
+        for at_once in std::iter::once(&events[..begun]).chain(events[begun..over].chunk_by(|a, b| a.0 == b.0)) {
+            for (_, receiver, sender, up) in at_once {
+                graph.set(*receiver, *sender, *up);
+            }
+            measured.graph(at_once.first().map_or(Time::ZERO, |(at, ..)| *at), graph.clone());
+        }
+        measured.advance(self.end);
+        measured
+    }
+
     /// The same network, looked at until then \[s\].
     pub fn until(&self, end_s: f64) -> Network {
-        let end_s = end_s.min(self.end_s);
-        let kept = |changes: &Vec<(f64, bool)>| changes.iter().copied().filter(|(at, _)| *at < end_s).collect();
+        let end = Time::from_secs(end_s).min(self.end);
+        let kept = |changes: &Vec<(Time, bool)>| changes.iter().copied().filter(|(at, _)| *at < end).collect();
         let changes = self.changes.iter().map(|(link, changes)| (link.clone(), kept(changes))).collect();
-        Network { start_s: self.start_s, end_s, changes }
+        Network { end, changes }
     }
 
     /// The measured connectivity with what was heard: how messages filled the times in which links were up.
     pub fn connectivity_heard(&self, exact: &[Record], facts: &Facts) -> Option<Connectivity> {
         let mut connectivity = self.connectivity(facts)?;
+        let end_s = self.end.secs();
         let mut messages: BTreeMap<(&str, &str), Vec<(f64, f64)>> = BTreeMap::new();
         let handed_over = |row: &&MessageRow| matches!(row.fate, Fate::Delivered | Fate::Copied);
         let rows = exact.iter().filter_map(|record| match record {
             Record::Message(row) => Some(row),
             _ => None,
         });
-        for row in rows.filter(handed_over).filter(|row| row.due_ns as f64 / 1e9 < self.end_s) {
+        for row in rows.filter(handed_over).filter(|row| row.due_ns < self.end.nanos()) {
             let times = (row.sent_ns as f64 / 1e9, row.due_ns as f64 / 1e9);
             messages.entry((&row.from, &row.to)).or_default().push(times);
         }
         let validity = facts.validity_s.unwrap_or(f64::INFINITY);
         for (from, to) in &facts.links {
             let down = self.down_times(from, to);
-            let up = complement(&down, self.start_s, self.end_s);
-            let ended = up.iter().filter(|(_, until)| *until < self.end_s).map(|(from, until)| until - from);
+            let up = complement(&down, 0.0, end_s);
+            let ended = up.iter().filter(|(_, until)| *until < end_s).map(|(from, until)| until - from);
             connectivity.shortest_up_s = ended.fold(connectivity.shortest_up_s, f64::min);
             let mut own = messages.remove(&(from.as_str(), to.as_str())).unwrap_or_default();
             own.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
-            let heard = Heard::of(&own, validity, self.end_s);
+            let heard = Heard::of(&own, validity, end_s);
             let lasts = |times: &[(f64, f64)]| times.iter().map(|(from, to)| to - from).sum::<f64>();
             let up_s = lasts(&up);
             if up_s > 0.0 {
@@ -362,53 +381,6 @@ impl Network {
         Some(connectivity)
     }
 
-    /// The run cut at every change of a link, with the edges that are up in each piece.
-    fn pieces(&self, facts: &Facts) -> Vec<Piece> {
-        let index = |id: &str| facts.vehicles.iter().position(|vehicle| vehicle.id == id);
-        let mut edges = BTreeSet::new();
-        let mut events: Vec<(f64, usize, usize, bool)> = Vec::new();
-        for ((from, to), changes) in &self.changes {
-            let (Some(from), Some(to)) = (index(from), index(to)) else { continue };
-            if changes.first().is_none_or(|first| !first.1) {
-                edges.insert((from, to));
-            }
-            events.extend(changes.iter().map(|(at, up)| (*at, from, to, *up)));
-        }
-        events.sort_by(|a, b| a.0.total_cmp(&b.0));
-        events.push((self.end_s, 0, 0, false));
-        let (mut pieces, mut since) = (Vec::new(), self.start_s);
-        for (at, from, to, up) in events {
-            if at > since {
-                pieces.push(Piece { length_s: at - since, edges: edges.clone() });
-                since = at;
-            }
-            if up {
-                edges.insert((from, to))
-            } else {
-                edges.remove(&(from, to))
-            };
-        }
-        pieces
-    }
-}
-
-/// A time in which no link changes.
-struct Piece {
-    length_s: f64,
-    edges: BTreeSet<(usize, usize)>,
-}
-
-/// The shortest time between two changes; `None` before the second.
-fn dwell(pieces: &[Piece]) -> Option<f64> {
-    let mut lengths: Vec<(f64, &BTreeSet<(usize, usize)>)> = Vec::new();
-    for piece in pieces {
-        match lengths.last_mut() {
-            Some((length, edges)) if **edges == piece.edges => *length += piece.length_s,
-            _ => lengths.push((piece.length_s, &piece.edges)),
-        }
-    }
-    let inner = lengths.len().checked_sub(2).map_or(&[][..], |inner| &lengths[1..=inner]);
-    inner.iter().map(|(length, _)| *length).min_by(f64::total_cmp)
 }
 
 /// What intervals leave of a time.
@@ -419,51 +391,7 @@ fn complement(intervals: &[(f64, f64)], start: f64, end: f64) -> Vec<(f64, f64)>
     left.filter(|(from, to)| to > from).collect()
 }
 
-/// The longest wait, over all instants, until the links seen since then connect the fleet. It is longest just after
-/// a change, and waits that the end of the run cuts short are counted only as far as they went.
-fn union_period(count: usize, pieces: &[Piece], connected: &[bool]) -> Option<f64> {
-    let mut longest = 0.0_f64;
-    let mut complete = false;
-    for start in 0..pieces.len() {
-        if connected[start] {
-            complete = true;
-            continue;
-        }
-        let mut union = BTreeSet::new();
-        let mut waited = 0.0;
-        let end = pieces[start..].iter().find(|piece| {
-            union.extend(piece.edges.iter().copied());
-            let done = has_root(count, &union);
-            waited += if done { 0.0 } else { piece.length_s };
-            done
-        });
-        complete |= end.is_some();
-        longest = longest.max(waited);
-        if end.is_none() {
-            break;
-        }
-    }
-    complete.then_some(longest)
-}
-
-/// Whether some vehicle's messages can reach all others (a globally reachable vertex of the graph of who hears whom).
-fn has_root(count: usize, edges: &BTreeSet<(usize, usize)>) -> bool {
-    (0..count).any(|root| {
-        let mut reached = vec![false; count];
-        let mut open = vec![root];
-        reached[root] = true;
-        while let Some(vertex) = open.pop() {
-            for (_, to) in edges.range((vertex, 0)..=(vertex, usize::MAX)) {
-                if !reached[*to] {
-                    reached[*to] = true;
-                    open.push(*to);
-                }
-            }
-        }
-        reached.into_iter().all(|reached| reached)
-    })
-}
-
+/// What two lists of intervals have in common.
 fn intersection(a: &[(f64, f64)], b: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let (mut i, mut j, mut common) = (0, 0, Vec::new());
     while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
@@ -631,9 +559,12 @@ mod tests {
 
     #[test]
     fn one_direction_is_enough_for_a_leader() {
-        let connected = |edges: &[(usize, usize)]| has_root(3, &edges.iter().copied().collect());
-        assert!(connected(&[(0, 1), (1, 2)]));
-        assert!(!connected(&[(0, 1), (2, 1)]));
+        let alpha = |links: &[(&str, &str)]| {
+            let facts = facts(links);
+            Network::of(&[], &facts).connectivity(&facts).expect("three vehicles").alpha
+        };
+        assert_eq!(alpha(&[("1", "2"), ("2", "3")]), 0.0);
+        assert_eq!(alpha(&[("1", "2"), ("3", "2")]), 1.0, "nobody hears both ends");
     }
 
     #[test]
