@@ -9,7 +9,8 @@ use serde::Serialize;
 
 use super::Facts;
 use super::decay::Decay;
-use super::network::{Connectivity, LinkSummary, Network, Spread, links, transmissions};
+use super::links::{LinkSummary, Spread, links, transmissions};
+use super::network::{Connectivity, Network};
 use super::punctuality::{ClockVerdict, verdict};
 use super::series::{Coordination, Track, speeds, tracks};
 use super::statistics::{ExponentialFit, FIT_PART, largest, mean, rms, settling_time, steady_from};
