@@ -609,7 +609,7 @@ fn tell(
         for row in rows.iter().filter(|row| row.is_below()) {
             bus::remark!("warning: {}: {}, although its conditions hold", row.name, row.measured);
         }
-        let m = &summary.fleet.messages;
+        let m = &summary.fleet.messages.counts;
         let more: String = [
             (m.out_of_range, "out of range"),
             (m.half_duplex, "unheard while speaking"),

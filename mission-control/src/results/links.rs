@@ -9,14 +9,10 @@ use super::Facts;
 use super::network::Network;
 use super::statistics::{largest, quantile, sorted};
 
-/// The messages of one directed link.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct LinkSummary {
-    /// The sender.
-    pub from: String,
-    /// The receiver.
-    pub to: String,
-    /// Messages that the emulator took for this link.
+/// How many messages there were, and what became of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MessageCounts {
+    /// Messages that the emulator took, times the links that they were sent on.
     pub sent: u64,
     /// Handed to the receiver.
     pub delivered: u64,
@@ -24,7 +20,7 @@ pub struct LinkSummary {
     pub lost: u64,
     /// Dropped because the link was down.
     pub link_down: u64,
-    /// Dropped because the queue was full.
+    /// Dropped because a queue was full.
     pub queue_full: u64,
     /// Dropped because the receiver was too far away.
     pub out_of_range: u64,
@@ -44,6 +40,71 @@ pub struct LinkSummary {
     pub copy_dropped: u64,
     /// Second copies under way when the mission ended.
     pub copy_in_flight: u64,
+}
+
+impl MessageCounts {
+    /// So many were sent, and so many met each fate.
+    fn new(sent: u64, met: impl Fn(Fate) -> u64) -> MessageCounts {
+        MessageCounts {
+            sent,
+            delivered: met(Fate::Delivered),
+            lost: met(Fate::Lost),
+            link_down: met(Fate::LinkDown),
+            queue_full: met(Fate::QueueFull),
+            out_of_range: met(Fate::OutOfRange),
+            half_duplex: met(Fate::HalfDuplex),
+            collision: met(Fate::Collision),
+            corrupt: met(Fate::Corrupt),
+            receiver_absent: met(Fate::ReceiverAbsent),
+            in_flight: met(Fate::InFlight),
+            copied: met(Fate::Copied),
+            copy_dropped: met(Fate::CopyDropped),
+            copy_in_flight: met(Fate::CopyInFlight),
+        }
+    }
+
+    /// How many met this fate.
+    pub fn met(&self, fate: Fate) -> u64 {
+        match fate {
+            Fate::Delivered => self.delivered,
+            Fate::Lost => self.lost,
+            Fate::LinkDown => self.link_down,
+            Fate::QueueFull => self.queue_full,
+            Fate::OutOfRange => self.out_of_range,
+            Fate::HalfDuplex => self.half_duplex,
+            Fate::Collision => self.collision,
+            Fate::Corrupt => self.corrupt,
+            Fate::ReceiverAbsent => self.receiver_absent,
+            Fate::InFlight => self.in_flight,
+            Fate::Copied => self.copied,
+            Fate::CopyDropped => self.copy_dropped,
+            Fate::CopyInFlight => self.copy_in_flight,
+        }
+    }
+
+    /// Those of all links together.
+    pub(super) fn over(links: &[LinkSummary]) -> MessageCounts {
+        let sent = links.iter().map(|link| link.messages.sent).sum();
+        MessageCounts::new(sent, |fate| links.iter().map(|link| link.messages.met(fate)).sum())
+    }
+
+    /// Whether each that was sent was delivered, dropped for one cause, or is under way.
+    fn is_accounted(&self) -> bool {
+        let dropped: u64 = Fate::DROPS.iter().map(|cause| self.met(*cause)).sum();
+        self.sent == self.delivered + dropped + self.in_flight
+    }
+}
+
+/// The messages of one directed link.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LinkSummary {
+    /// The sender.
+    pub from: String,
+    /// The receiver.
+    pub to: String,
+    /// What became of its messages.
+    #[serde(flatten)]
+    pub messages: MessageCounts,
     /// Sequence numbers between the first and the last of a sender's life that have no row.
     pub missing: u64,
     /// Messages with more than one row.
@@ -110,7 +171,8 @@ pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<L
 }
 
 fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
-    let count = |fate| rows.iter().filter(|row| row.fate == fate).count() as u64;
+    let mut fates: BTreeMap<Fate, u64> = BTreeMap::new();
+    rows.iter().for_each(|row| *fates.entry(row.fate).or_default() += 1);
     // Copies were sent by nobody: they have no part in the ledger of what was sent.
     let sent = rows.iter().filter(|row| !row.fate.is_of_copy());
     let mut in_order: Vec<(i64, u64)> = sent.map(|row| (row.sent_ns, row.seq)).collect();
@@ -126,31 +188,17 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
     }
     let delays =
         rows.iter().filter(|row| row.fate == Fate::Delivered).map(|row| (row.due_ns - row.sent_ns) as f64 / 1e9);
-    let delivered = count(Fate::Delivered);
-    let summary = LinkSummary {
-        sent: in_order.len() as u64 - repeated,
-        delivered,
-        lost: count(Fate::Lost),
-        link_down: count(Fate::LinkDown),
-        queue_full: count(Fate::QueueFull),
-        in_flight: count(Fate::InFlight),
-        out_of_range: count(Fate::OutOfRange),
-        half_duplex: count(Fate::HalfDuplex),
-        collision: count(Fate::Collision),
-        corrupt: count(Fate::Corrupt),
-        receiver_absent: count(Fate::ReceiverAbsent),
-        copied: count(Fate::Copied),
-        copy_dropped: count(Fate::CopyDropped),
-        copy_in_flight: count(Fate::CopyInFlight),
+    let met = |fate: Fate| fates.get(&fate).copied().unwrap_or(0);
+    let messages = MessageCounts::new(in_order.len() as u64 - repeated, met);
+    LinkSummary {
+        messages,
         missing,
         repeated,
-        delivered_bytes: delivered * message_bytes,
+        balanced: messages.is_accounted() && missing == 0 && repeated == 0,
+        delivered_bytes: messages.delivered * message_bytes,
         delay: Spread::of(&delays.collect::<Vec<_>>()),
         ..LinkSummary::default()
-    };
-    let dropped: u64 = Fate::DROPS.iter().map(|cause| count(*cause)).sum();
-    let accounted = summary.delivered + dropped + summary.in_flight;
-    LinkSummary { balanced: summary.sent == accounted && missing == 0 && repeated == 0, ..summary }
+    }
 }
 
 /// Number of transmissions by sender: a message to several receivers goes on the air once, and one that found no place in its
@@ -191,7 +239,7 @@ mod tests {
         let rows: Vec<Record> = (0..).zip(fates).map(|(seq, fate)| message(seq, seq as i64, fate)).collect();
         let link = link_1_2(&rows);
         assert!(link.balanced);
-        assert_eq!((link.sent, link.delivered, link.delivered_bytes), (6, 2, 20));
+        assert_eq!((link.messages.sent, link.messages.delivered, link.delivered_bytes), (6, 2, 20));
         assert_eq!(link.delay, Some(Spread { median: 5.0, p99: 5.0, max: 5.0 }));
         assert_eq!(transmissions(&rows).values().sum::<u64>(), 6);
     }
@@ -204,19 +252,10 @@ mod tests {
             rows.push(message(3, 3, fate));
         }
         let link = link_1_2(&rows);
-        let causes = [
-            link.lost,
-            link.out_of_range,
-            link.link_down,
-            link.queue_full,
-            link.half_duplex,
-            link.collision,
-            link.corrupt,
-            link.receiver_absent,
-        ];
-        assert_eq!(causes, [1; 8]);
-        assert_eq!((link.copied, link.copy_dropped, link.copy_in_flight), (1, 1, 1));
-        assert_eq!((link.sent, link.delivered, link.repeated, link.balanced), (8, 0, 0, true));
+        let counts = link.messages;
+        assert_eq!(Fate::ALL.map(|fate| counts.met(fate)), [0, 1, 1, 1, 0, 1, 1, 1, 1, 1, 1, 1, 1]);
+        assert_eq!((counts.sent, link.repeated, link.balanced), (8, 0, true));
+        assert_eq!(MessageCounts::over(&[link.clone(), link]).half_duplex, 2);
     }
 
     #[test]
@@ -245,7 +284,7 @@ mod tests {
         let gap = link_1_2(&[message(0, 0, Fate::Delivered), message(2, 2, Fate::Delivered)]);
         assert_eq!((gap.missing, gap.balanced), (1, false));
         let twice = link_1_2(&[message(0, 0, Fate::Delivered), message(0, 0, Fate::Lost)]);
-        assert_eq!((twice.repeated, twice.sent, twice.balanced), (1, 1, false));
+        assert_eq!((twice.repeated, twice.messages.sent, twice.balanced), (1, 1, false));
         let second_life = link_1_2(&[message(7, 0, Fate::Delivered), message(0, 5, Fate::Delivered)]);
         assert!(second_life.balanced);
     }
@@ -255,7 +294,7 @@ mod tests {
         let facts = facts(&[("2", "1")]);
         let rows = [message(0, 0, Fate::Delivered)];
         let links = links(&rows, &facts, &Network::of(&rows, &facts));
-        let names: Vec<_> = links.iter().map(|link| (link.from.as_str(), link.sent)).collect();
+        let names: Vec<_> = links.iter().map(|link| (link.from.as_str(), link.messages.sent)).collect();
         assert_eq!(names, [("2", 0), ("1", 1)]);
     }
 

@@ -38,7 +38,7 @@ pub use facts::{Facts, VehicleFacts, Way};
 pub use figures::{Figure, figures};
 pub use folder::{Account, Theory, write_run_folder};
 pub use graph::{GraphFacts, SpanningFacts, SplitFacts, TakenFacts};
-pub use links::{LinkSummary, Spread};
+pub use links::{LinkSummary, MessageCounts, Spread};
 pub use network::{Connectivity, Network};
 pub use punctuality::ClockVerdict;
 pub use report::{BELOW, Report, TheoryRow, report};

@@ -8,7 +8,7 @@ use super::decay::fitted_where;
 use super::drawing::{GRID, INK, PAPER};
 use super::graph::printed;
 use super::summary::PATH_THRESHOLD_M;
-use super::{ClockSummary, Facts, Figure, GraphFacts, LinkSummary, Summary, VehicleSummary};
+use super::{ClockSummary, Facts, Figure, GraphFacts, LinkSummary, MessageCounts, Summary, VehicleSummary};
 
 /// A line of the table "theory beside measurement".
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -292,24 +292,26 @@ fn network(page: &mut String, report: &Report<'_>) {
     page.push_str("<section>\n<h2>Network</h2>\n");
     let totals = &report.summary.fleet.messages;
     // What can always happen has a column, the rest only where it did.
-    type Column = (&'static str, fn(&LinkSummary) -> u64, u64, bool);
-    let columns: Vec<Column> = [
-        ("sent", (|link| link.sent) as fn(&LinkSummary) -> u64, totals.sent, true),
-        ("delivered", |link| link.delivered, totals.delivered, true),
-        ("lost", |link| link.lost, totals.lost, true),
-        ("out of range", |link| link.out_of_range, totals.out_of_range, false),
-        ("link down", |link| link.link_down, totals.link_down, true),
-        ("queue full", |link| link.queue_full, totals.queue_full, true),
-        ("deaf while speaking", |link| link.half_duplex, totals.half_duplex, false),
-        ("collided", |link| link.collision, totals.collision, false),
-        ("corrupt", |link| link.corrupt, totals.corrupt, false),
-        ("receiver absent", |link| link.receiver_absent, totals.receiver_absent, false),
-        ("in flight", |link| link.in_flight, totals.in_flight, true),
-        ("second copies", |link| link.copied, totals.copied, false),
-    ]
-    .into_iter()
-    .filter(|(_, _, total, always)| *always || *total > 0)
-    .collect();
+    type Column = (&'static str, fn(&MessageCounts) -> u64, bool);
+    let columns: [Column; 12] = [
+        ("sent", |counts| counts.sent, true),
+        ("delivered", |counts| counts.delivered, true),
+        ("lost", |counts| counts.lost, true),
+        ("out of range", |counts| counts.out_of_range, false),
+        ("link down", |counts| counts.link_down, true),
+        ("queue full", |counts| counts.queue_full, true),
+        ("deaf while speaking", |counts| counts.half_duplex, false),
+        ("collided", |counts| counts.collision, false),
+        ("corrupt", |counts| counts.corrupt, false),
+        ("receiver absent", |counts| counts.receiver_absent, false),
+        ("in flight", |counts| counts.in_flight, true),
+        ("second copies", |counts| counts.copied, false),
+    ];
+    let shown = columns.into_iter().filter(|(_, count, always)| *always || count(&totals.counts) > 0);
+    let columns: Vec<Column> = shown.collect();
+    let counted = |counts: &MessageCounts| -> Vec<String> {
+        columns.iter().map(|(_, count, _)| count(counts).to_string()).collect()
+    };
     let mut header = vec!["link"];
     header.extend(columns.iter().map(|column| column.0));
     header.extend(["delay [s]", "up", "longest outage [s]", "ledger"]);
@@ -317,7 +319,7 @@ fn network(page: &mut String, report: &Report<'_>) {
         let ledger =
             if link.balanced { "<span class=\"yes\">balanced</span>" } else { "<span class=\"no\">open</span>" };
         let mut cells = vec![format!("{}&nbsp;→&nbsp;{}", escape(&link.from), escape(&link.to))];
-        cells.extend(columns.iter().map(|column| column.1(link).to_string()));
+        cells.extend(counted(&link.messages));
         cells.extend([
             optional(link.delay.map(|delay| delay.median), ""),
             percent(link.up_fraction),
@@ -328,14 +330,14 @@ fn network(page: &mut String, report: &Report<'_>) {
     };
     let sum = (links.len() > 1).then(|| {
         let mut cells = vec!["all".to_owned()];
-        cells.extend(columns.iter().map(|column| column.2.to_string()));
+        cells.extend(counted(&totals.counts));
         cells.extend(["", "", "", ""].map(str::to_owned));
         cells
     });
     // A complete graph of two hundred vehicles would be a page of its own.
     let mut shown: Vec<&LinkSummary> = links.iter().collect();
     if shown.len() > MOST_LINKS {
-        shown.sort_by_key(|link| std::cmp::Reverse(link.sent - link.delivered.min(link.sent)));
+        shown.sort_by_key(|link| std::cmp::Reverse(link.messages.sent.saturating_sub(link.messages.delivered)));
         shown.truncate(MOST_LINKS);
     }
     table(page, "numbers", &header, shown.iter().map(|link| row(link)).chain(sum));

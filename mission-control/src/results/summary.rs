@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::Facts;
 use super::decay::Decay;
-use super::links::{LinkSummary, Spread, links, transmissions};
+use super::links::{LinkSummary, MessageCounts, Spread, links, transmissions};
 use super::network::{Connectivity, Network};
 use super::punctuality::{ClockVerdict, verdict};
 use super::series::{Coordination, Track, speeds, tracks};
@@ -154,34 +154,9 @@ pub struct CoordinationSeries {
 /// Sums over all links.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MessageTotals {
-    /// Messages times the links that they were sent on.
-    pub sent: u64,
-    /// Delivered.
-    pub delivered: u64,
-    /// Dropped, by cause.
-    pub lost: u64,
-    /// Dropped because the link was down.
-    pub link_down: u64,
-    /// Dropped because a queue was full.
-    pub queue_full: u64,
-    /// Dropped because the receiver was too far away.
-    pub out_of_range: u64,
-    /// Dropped because the receiver was speaking itself.
-    pub half_duplex: u64,
-    /// Dropped because another message arrived at the same time.
-    pub collision: u64,
-    /// Handed over with a flipped bit, and dropped by the receiver.
-    pub corrupt: u64,
-    /// Dropped because there was no process of the receiver.
-    pub receiver_absent: u64,
-    /// Under way at the end.
-    pub in_flight: u64,
-    /// Second copies handed to the receiver; they do not count as sent.
-    pub copied: u64,
-    /// Second copies that did not get there.
-    pub copy_dropped: u64,
-    /// Second copies under way when the mission ended.
-    pub copy_in_flight: u64,
+    /// What became of them.
+    #[serde(flatten)]
+    pub counts: MessageCounts,
     /// Transmissions: a message to several receivers goes on the air once; one that found no place in its sender's queue never.
     pub transmissions: u64,
     /// Size of one message on the air, as the medium packs it; of the largest, where they differ \[bytes\].
@@ -517,22 +492,8 @@ fn steady_part(t_s: &[f64], facts: &Facts) -> usize {
 }
 
 fn totals(links: &[LinkSummary], said: &BTreeMap<&str, u64>, facts: &Facts) -> MessageTotals {
-    let sum = |value: fn(&LinkSummary) -> u64| links.iter().map(value).sum();
     MessageTotals {
-        sent: sum(|link| link.sent),
-        delivered: sum(|link| link.delivered),
-        lost: sum(|link| link.lost),
-        link_down: sum(|link| link.link_down),
-        queue_full: sum(|link| link.queue_full),
-        in_flight: sum(|link| link.in_flight),
-        out_of_range: sum(|link| link.out_of_range),
-        half_duplex: sum(|link| link.half_duplex),
-        collision: sum(|link| link.collision),
-        corrupt: sum(|link| link.corrupt),
-        receiver_absent: sum(|link| link.receiver_absent),
-        copied: sum(|link| link.copied),
-        copy_dropped: sum(|link| link.copy_dropped),
-        copy_in_flight: sum(|link| link.copy_in_flight),
+        counts: MessageCounts::over(links),
         transmissions: said.values().sum(),
         message_bytes: facts.message_bytes,
         bytes_on_air: said.iter().map(|(id, said)| said * facts.bytes_of(id)).sum(),
@@ -614,7 +575,7 @@ mod tests {
         assert!((vehicle.alone_fraction - 0.75).abs() < 1e-3);
         let totals = &summary.fleet.messages;
         assert!(totals.balanced && summary.warnings.is_empty(), "{:?}", summary.warnings);
-        assert_eq!(totals.sent, 4 * 801);
+        assert_eq!(totals.counts.sent, 4 * 801);
         // v2 speaks to both neighbours at once.
         assert_eq!(totals.transmissions, 3 * 801);
         assert_eq!(totals.bytes_on_air, 801 * (40 + 40 + 44));
