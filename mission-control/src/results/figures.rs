@@ -22,7 +22,7 @@ use super::drawing::{
 use super::network::Network;
 use super::report::number;
 use super::series::{Coordination, Track, tracks, unbroken};
-use super::summary::thinned;
+use super::statistics::thinned;
 
 /// One figure.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,6 +11,8 @@
 //! | [`diff()`], [`compare()`] | *equal*, or the first row in which two runs part |
 
 mod chart;
+mod clock;
+mod coordination;
 mod decay;
 mod diff;
 pub(crate) mod drawing;
@@ -30,8 +32,11 @@ mod summary;
 #[cfg(test)]
 pub(crate) mod testing;
 mod trace;
+mod vehicle;
 
 pub use chart::{Chart, Curve};
+pub use clock::{ClockSummary, DeadlineSummary, DeliverySummary, NoteSummary, OverrunSummary, summarise_clock};
+pub use coordination::CoordinationSummary;
 pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts, Way};
@@ -44,8 +49,6 @@ pub use punctuality::ClockVerdict;
 pub use report::{BELOW, Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
 pub use statistics::{ExponentialFit, FIT_PART, fit_coordination, fit_exponential, settling_time};
-pub use summary::{
-    Absence, ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals,
-    NoteSummary, OverrunSummary, Summary, VehicleSummary, summarise, summarise_clock,
-};
+pub use summary::{Absence, FleetSummary, MessageTotals, Summary, summarise};
 pub use trace::network_section;
+pub use vehicle::VehicleSummary;

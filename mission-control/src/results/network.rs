@@ -213,7 +213,6 @@ impl Network {
         }
         Some(connectivity)
     }
-
 }
 
 /// What intervals leave of a time.

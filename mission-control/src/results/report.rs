@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::decay::fitted_where;
 use super::drawing::{GRID, INK, PAPER};
 use super::graph::printed;
-use super::summary::PATH_THRESHOLD_M;
+use super::vehicle::PATH_THRESHOLD_M;
 use super::{ClockSummary, Facts, Figure, GraphFacts, LinkSummary, MessageCounts, Summary, VehicleSummary};
 
 /// A line of the table "theory beside measurement".

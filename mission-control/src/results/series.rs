@@ -6,7 +6,7 @@ use common::mission::Pattern;
 use common::record::{Record, SpeedRow, StateRow};
 use common::time::Time;
 
-use super::statistics::mean;
+use super::statistics::{mean, steady_from};
 use super::{Facts, Way};
 
 /// The rows of one vehicle in order of time.
@@ -137,6 +137,18 @@ pub(super) fn unbroken(t_s: &[f64], facts: &Facts) -> Vec<Range<usize>> {
     let breaks = (1..t_s.len()).filter(|at| t_s[*at] - t_s[*at - 1] > longest);
     let bounds: Vec<usize> = std::iter::once(0).chain(breaks).chain([t_s.len()]).collect();
     bounds.windows(2).map(|pair| pair[0]..pair[1]).filter(|part| !part.is_empty()).collect()
+}
+
+/// The index at which the steady part begins.
+pub(super) fn steady_part(t_s: &[f64], facts: &Facts) -> usize {
+    let (Some(first), Some(last)) = (t_s.first(), t_s.last()) else { return 0 };
+    let from = steady_from(*last, *first, facts.link_period_s);
+    t_s.partition_point(|time| *time < from - 1e-9)
+}
+
+/// Whether an instant is before the end by more than a row or two.
+pub(super) fn is_early(t_s: f64, duration_s: f64) -> bool {
+    duration_s - t_s > (0.01 * duration_s).max(1.0)
 }
 
 /// The norm of what values differ from their mean by.
