@@ -15,7 +15,7 @@ use common::wire::vehicle::{ClockPlan, Phase};
 
 use crate::console::{Count, Progress};
 use crate::gallery::{GALLERY, Gallery};
-use crate::results::report::told;
+use crate::results::html::told;
 use crate::results::{ClockVerdict, Summary, TheoryRow, compare as compare_runs, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::measure::index_of;
