@@ -149,6 +149,14 @@ impl Envelope {
     pub fn at(&self, t: f64) -> f64 {
         self.factor * (-self.rate * t).exp()
     }
+
+    /// The mean of that over so much time \[s\].
+    pub fn mean(&self, length: f64) -> f64 {
+        match self.rate > 0.0 {
+            true => self.factor * -(-self.rate * length).exp_m1() / (self.rate * length),
+            false => self.factor,
+        }
+    }
 }
 
 /// What messages in periods may cost, see the head of this file.
@@ -662,6 +670,15 @@ mod tests {
         assert!(close(0.0, 15.1) && close(2.0, 15.1) && close(7.0, 15.0 * (-1.5f64).exp() + 0.1));
         // Rounding is allowed for, in proportion.
         assert!(Tolerance::default().allowed(&envelope, 5.0, 0.0) > 15.0);
+    }
+
+    #[test]
+    fn the_mean_of_an_envelope_is_that_of_its_values() {
+        let envelope = Envelope { statement: "", factor: 2.0, rate: 0.1 };
+        let values = (0..10_000).map(|i| envelope.at(30.0 * (f64::from(i) + 0.5) / 1e4));
+        let mean = values.sum::<f64>() / 1e4;
+        assert!((envelope.mean(30.0) - mean).abs() < 1e-6);
+        assert_eq!(Envelope { rate: 0.0, ..envelope }.mean(30.0), 2.0);
     }
 
     #[test]
