@@ -3,7 +3,7 @@
 //! A line is reused when its participant comes back, but its session is not: every admission opens a fresh session on a
 //! fresh port. What a frozen ghost of the participant still sends to the old port reaches nobody.
 //!
-//! Here is what the program sees of it; lines are opened and closed by the [`clerk`].
+//! Here is what the program sees of it; the clerk opens and closes lines.
 
 mod clerk;
 mod lines;
