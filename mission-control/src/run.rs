@@ -141,19 +141,11 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
     let logs =
         if plan.is_own() { folder::logs(&folder, plan.mission.digest) } else { folder::recordings_in(&collected) };
     if logs.is_empty() {
-        let missing: Vec<String> = landing.missing_logs().chain(ended_early).collect();
-        let why = format!("nothing was recorded: {}", missing.join(", "));
-        let Some(line) = line else {
-            return Err(Failure::Files(format!("{why}; see logs/ in {}", folder.display())));
-        };
-        if landing.nobody_has_a_log() {
-            // Nor will there ever be one: the next run of the mission must not look for it again.
-            dismiss(line);
-        } else {
-            line.close();
+        let failure = nothing_recorded(&folder, line, &landing, ended_early);
+        if !plan.is_own() {
+            discard(&folder);
         }
-        discard(&folder);
-        return Err(Failure::Files(why));
+        return Err(failure);
     }
     let flight = merge_logs(plan, &folder, &logs, &landing, ended_early)?;
     if let Some(line) = line {
@@ -214,6 +206,19 @@ fn conduct(
 fn dismiss(line: Line) {
     let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
     line.close();
+}
+
+/// Leaves a fleet that has no log of the flight at all.
+fn nothing_recorded(folder: &Path, line: Option<Line>, landing: &Landing, ended_early: Vec<String>) -> Failure {
+    let missing: Vec<String> = landing.missing_logs().chain(ended_early).collect();
+    let why = format!("nothing was recorded: {}", missing.join(", "));
+    match line {
+        None => return Failure::Files(format!("{why}; see logs/ in {}", folder.display())),
+        // Nor will there ever be one: the next run of the mission must not look for it again.
+        Some(line) if landing.nobody_has_a_log() => dismiss(line),
+        Some(line) => line.close(),
+    }
+    Failure::Files(why)
 }
 
 /// A flight whose recording is on disk.
