@@ -15,7 +15,7 @@ use common::time::Time;
 use common::wire::vehicle::LogPiece;
 
 use crate::recording::packed::{PACK, Pack};
-use crate::recording::{FLUSH_PERIOD, Origin, Recorder, RowReader, time_of};
+use crate::recording::{FLUSH_PERIOD, Origin, Recorder, RowReader};
 
 /// Helpings of rows that wait for the disk; beyond, the process waits too, and it is noted how often.
 const QUEUE: usize = 256;
@@ -183,7 +183,7 @@ impl Logs {
         if let Some(open) = &mut self.open {
             // What is in the pack came before it.
             open.hand_over_pack();
-            open.last_t_ns = time_of(&row);
+            open.last_t_ns = row.t_ns();
             // A command cannot be told again by who is killed a moment later.
             let commanded = matches!(row, Row::Exact(Record::Speed(_)));
             open.rows.push(row);
@@ -308,7 +308,7 @@ fn ends_of(files: &[PathBuf]) -> Earlier {
         let Ok(reader) = RowReader::open(file) else { continue };
         let mut last_state = None;
         for row in reader.map_while(Result::ok) {
-            earlier.until = earlier.until.max(Some(Time::from_nanos(time_of(&row))));
+            earlier.until = earlier.until.max(Some(Time::from_nanos(row.t_ns())));
             if let Row::Exact(Record::State(state)) = row {
                 last_state = Some(state);
             }

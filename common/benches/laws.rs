@@ -30,7 +30,8 @@ use cpf_common::coordination::{CoordinationLaw, FleetLaw, Neighbour, Own, SpeedR
 use cpf_common::craft::Craft;
 use cpf_common::craft::kinematic::KinematicCraft;
 use cpf_common::craft::marine::{MarineCraft, SideSlip};
-use cpf_common::craft::robot::{RobotCraft, SpeedLoop};
+use cpf_common::craft::robot::RobotCraft;
+use cpf_common::craft::speed_loop::SpeedLoop;
 use cpf_common::craft::trimming::TrimmingCraft;
 use cpf_common::following::decoupling_2_14::Decoupling;
 use cpf_common::following::h2_figure_2_4::{Controller, Disturbances as H2Disturbances, design};

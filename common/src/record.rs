@@ -324,6 +324,18 @@ pub enum ClockRecord {
     Overrun(OverrunRow),
 }
 
+impl ClockRecord {
+    /// When the row was written, in mission time \[ns\].
+    pub fn t_ns(&self) -> i64 {
+        match self {
+            ClockRecord::Achieved(row) => row.t_ns,
+            ClockRecord::Ticks(row) => row.t_ns,
+            ClockRecord::Note(row) => row.t_ns,
+            ClockRecord::Overrun(row) => row.t_ns,
+        }
+    }
+}
+
 /// Any row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Row {
@@ -331,4 +343,14 @@ pub enum Row {
     Exact(Record),
     /// Depends on the wall clock.
     Clock(ClockRecord),
+}
+
+impl Row {
+    /// When the row was written, in mission time \[ns\].
+    pub fn t_ns(&self) -> i64 {
+        match self {
+            Row::Exact(record) => record.t_ns(),
+            Row::Clock(record) => record.t_ns(),
+        }
+    }
 }

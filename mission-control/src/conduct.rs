@@ -15,7 +15,7 @@ use vehicle_node::node::STOPPED;
 /// Between two questions after the fleet's status.
 const POLL: Span = Span::from_nanos(200_000_000);
 /// Why a log is missing that there never was.
-pub(crate) const NO_LOG: &str = "it has no log of this mission";
+const NO_LOG: &str = "it has no log of this mission";
 /// A piece of a log that has not come after this long is asked for again.
 const PIECE_PATIENCE: Span = Span::from_nanos(3_000_000_000);
 /// How often the same piece is asked for before the log is given up.
@@ -79,6 +79,18 @@ pub struct Landing {
     pub missing: Vec<(String, String)>,
     /// Vehicles that gave up by themselves, and why.
     pub aborted: Vec<String>,
+}
+
+impl Landing {
+    /// Which logs are missing and why, in words.
+    pub(crate) fn missing_logs(&self) -> impl Iterator<Item = String> + '_ {
+        self.missing.iter().map(|(who, why)| format!("log of {who}: {why}"))
+    }
+
+    /// Whether no log is missing but such as there never was.
+    pub(crate) fn nobody_has_a_log(&self) -> bool {
+        self.missing.iter().all(|(_, why)| why == NO_LOG)
+    }
 }
 
 /// Where a conducted flight is.

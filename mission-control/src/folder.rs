@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use bus::recording::{Merged, Recording, merge, read};
+use bus::recording::{Recording, merge, read};
 use common::mission::Mission;
 use common::record::Record;
 use common::time::Time;
 use serde::{Deserialize, Serialize};
 
 use crate::facts::{facts_at, speed_in_force};
+use crate::missing::damage;
 use crate::results::{Account, ClockSummary, Summary, Theory, write_run_folder};
 use crate::theory;
 
@@ -242,22 +243,12 @@ pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| error.to_string())?;
     let how = format!("mission-control, from {} logs of a run that it did not end,", logs.len());
-    let missing = shortcomings(&merged);
+    let missing = damage(&merged);
     let mut notes = vec![format!("Merged from {} logs after the run: mission-control did not end it.", logs.len())];
     notes.extend(missing.iter().map(|text| format!("Missing: {text}")));
     let host = HostFacts { salvaged: true, ..HostFacts::now(&how, None, 0.0, missing, Vec::new()) };
     write_host(folder, &host)?;
     Ok(Some(notes))
-}
-
-/// What is missing from a merged recording, in words.
-pub fn shortcomings(merged: &Merged) -> Vec<String> {
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let cut = merged.incomplete.iter().map(|path| format!("{} ends in the middle", name(path)));
-    let damaged = merged.damaged.iter().map(|(path, chunks, cause)| {
-        format!("{chunks} damaged pieces of {} are left out; the first: {cause}", name(path))
-    });
-    cut.chain(damaged).collect()
 }
 
 /// Whether a run's folder is still to be made. One that was there is somebody's, and not removed again.

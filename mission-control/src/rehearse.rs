@@ -73,17 +73,6 @@ fn write_before<W: std::io::Write + std::io::Seek>(
     before: Time,
 ) -> bus::recording::Result<()> {
     pending.sort_by(canonical_order);
-    let ready = pending.partition_point(|row| t_ns(row) < before.nanos());
+    let ready = pending.partition_point(|row| row.t_ns() < before.nanos());
     pending.drain(..ready).try_for_each(|row| recorder.write(row))
-}
-
-fn t_ns(row: &Row) -> i64 {
-    use common::record::ClockRecord;
-    match row {
-        Row::Exact(record) => record.t_ns(),
-        Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
-        Row::Clock(ClockRecord::Ticks(row)) => row.t_ns,
-        Row::Clock(ClockRecord::Note(row)) => row.t_ns,
-        Row::Clock(ClockRecord::Overrun(row)) => row.t_ns,
-    }
 }

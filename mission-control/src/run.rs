@@ -1,19 +1,16 @@
 //! `run`: conducts a flight of real processes, its own or a fleet that is already up.
 
-use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Seek, SeekFrom, Write};
-use std::net::TcpListener;
-use std::os::unix::process::CommandExt;
+use std::fs::{self, OpenOptions};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::console::StopFlag;
 use bus::drive::{Clock, Next, Port, Program, Shared, drive};
 use bus::line::{Line, LineConfig, LineEvent};
-use bus::recording::{Merged, merge};
+use bus::queue::Events;
+use bus::recording::merge;
 use bus::setup::Endpoint;
 use bus::{Plane, Refusal};
 use common::mission::Mission;
@@ -21,18 +18,17 @@ use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet};
 use common::wire::vehicle::{LogPiece, Phase};
 use common::wire::{self, GarbageCount};
-use network_emulator::hub::{COLLECTOR, HUB};
-use rustix::process::{Pid, Signal, kill_process};
+use network_emulator::hub::COLLECTOR;
 
-use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, NO_LOG, Step};
+use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
+use crate::missing;
+use crate::processes::Processes;
 use crate::results::{ClockSummary, Summary};
 
 /// How long own processes may take to come up.
 const OWN_PATIENCE: Duration = Duration::from_secs(60);
-/// How long own processes may take to end after they were dismissed.
-const FAREWELL: Duration = Duration::from_secs(3);
 
 /// How a flight shall be flown.
 pub struct Plan {
@@ -48,6 +44,18 @@ pub struct Plan {
     pub pace: Pace,
     /// How long to wait until every vehicle of a fleet that is already up is armed.
     pub patience: Option<Duration>,
+}
+
+impl Plan {
+    /// Whether the fleet is started for this flight, and ends with it.
+    fn is_own(&self) -> bool {
+        self.attach.is_none()
+    }
+
+    /// How long to wait until every vehicle is armed.
+    fn patience(&self) -> Option<Duration> {
+        if self.is_own() { Some(OWN_PATIENCE) } else { self.patience }
+    }
 }
 
 /// What became of a flight.
@@ -82,6 +90,7 @@ pub enum Failure {
 /// # Errors
 /// Why there is no flight to report on.
 pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
+    let begun = Instant::now();
     let is_new = folder::is_new(plan.out.as_deref());
     let discard = |folder: &Path| {
         if is_new {
@@ -89,10 +98,8 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         }
     };
     let make_folder = || folder::make(plan.out.as_deref(), &plan.mission).map_err(Failure::Files);
-    let begun = Instant::now();
-    let own = plan.attach.is_none();
     let stop = StopFlag::on_signals();
-    if own {
+    if plan.is_own() {
         stop.arm();
     }
     let (endpoint, mut processes, folder) = match &plan.attach {
@@ -104,47 +111,20 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
             (endpoint, processes, Some(folder))
         }
     };
-    let mut config = LineConfig::new(endpoint.clone(), COLLECTOR);
-    config.patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
-    let (line, events) = Line::connect(config).map_err(|error| match error {
-        bus::Error::Refused(refusal @ Refusal::Taken { .. }) => Failure::Unreachable(format!(
-            "{refusal} to this fleet: another run conducts it. Wait until that is over, or end it with: mission-control stop"
-        )),
-        error => Failure::Unreachable(error.to_string()),
-    })?;
+    let (line, events) = connect(endpoint, plan.patience())?;
     stop.arm();
     // A fleet that cannot be reached leaves no folder behind.
     let folder = folder.map_or_else(make_folder, Ok)?;
-    let patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
-    let patience = patience.map(|p| Span::from_secs(p.as_secs_f64()));
-    let conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !own);
-    let port = ConductPort {
-        line,
-        own,
-        mission: plan.mission.clone(),
-        processes: &mut processes,
-        progress: Progress::new(plan.mission.end),
-        collected: folder.join(".collected"),
-        stop,
-        interrupted: false,
-        pace: plan.pace,
-        joined: false,
-        garbage: GarbageCount::default(),
-    };
-    let program = Shared::new(Program::new(conduct, port, Clock::from_now()));
-    let exit = drive(&program, &events);
-    let port = program.into_port();
-    port.progress.done();
-    let ConductPort { line, collected, .. } = port;
+    let collected = folder.join(".collected");
+    let (ending, line) = conduct(plan, line, &events, &mut processes, &collected, stop);
     // Own processes close their logs and end; the logs of others are theirs to keep until they are merged here.
-    let line = if own {
-        let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
-        line.close();
+    let line = if plan.is_own() {
+        dismiss(line);
         None
     } else {
         Some(line)
     };
-    let Landing { phase, pace, missing, aborted } = match exit {
+    let landing = match ending {
         Ok(landing) => landing,
         Err(failure) => {
             processes.terminate();
@@ -153,49 +133,134 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
             return Err(failure);
         }
     };
-    if phase != Phase::Finished {
+    if landing.phase != Phase::Finished {
         processes.terminate();
     }
-    let nobody_has_one = missing.iter().all(|(_, why)| why == NO_LOG);
-    let mut missing: Vec<String> = missing.into_iter().map(|(who, why)| format!("log of {who}: {why}")).collect();
-    missing.extend(processes.end());
+    let ended_early = processes.end();
 
-    let logs = if own { folder::logs(&folder, plan.mission.digest) } else { folder::recordings_in(&collected) };
+    let logs =
+        if plan.is_own() { folder::logs(&folder, plan.mission.digest) } else { folder::recordings_in(&collected) };
     if logs.is_empty() {
-        let why = format!("nothing was recorded: {}", missing.join(", "));
-        if let Some(line) = line {
-            if nobody_has_one {
-                // Nor will there ever be: the next run of the mission must not look for it again.
-                let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
-            }
-            line.close();
+        let failure = nothing_recorded(&folder, line, &landing, ended_early);
+        if !plan.is_own() {
             discard(&folder);
-            return Err(Failure::Files(why));
         }
-        return Err(Failure::Files(format!("{why}; see logs/ in {}", folder.display())));
+        return Err(failure);
     }
-    let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
-    missing.extend(folder::shortcomings(&merged));
-    // A flight that was joined or only collected may have been started by someone else.
-    let pace = pace.unwrap_or(plan.pace);
-    missing.extend(late_beginnings(&plan.mission, pace, &merged));
-    let cut_short = cut_short(&plan.mission, phase, &merged);
-    let sound = phase == Phase::Finished && aborted.is_empty() && cut_short.is_empty();
-    missing.extend(cut_short.into_iter().filter(|(id, _)| !gave_up(&aborted, id)).map(|(_, text)| text));
+    let flight = merge_logs(plan, &folder, &logs, &landing, ended_early)?;
     if let Some(line) = line {
         // What is on disk here need not be kept there.
-        let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
-        line.close();
+        dismiss(line);
         let _ = fs::remove_dir_all(&collected);
     }
-    let how = format!("mission-control run{}{}", if own { "" } else { " --attach" }, option(pace));
-    let speed_up = match pace {
-        Pace::Real { speed_up } => Some(speed_up),
-        Pace::Stepped => None,
-    };
-    let host = HostFacts::now(&how, speed_up, begun.elapsed().as_secs_f64(), missing, aborted);
+    let sound = flight.sound;
+    let host = flight.host(plan.is_own(), begun.elapsed(), landing.aborted);
     let (summary, clock) = folder::finish(&folder, &host).map_err(Failure::Files)?;
-    Ok(Flown { folder, phase, sound, summary, clock })
+    Ok(Flown { folder, phase: landing.phase, sound, summary, clock })
+}
+
+/// The line to a fleet.
+fn connect(endpoint: Endpoint, patience: Option<Duration>) -> Result<(Line, Events<LineEvent>), Failure> {
+    let mut config = LineConfig::new(endpoint, COLLECTOR);
+    config.patience = patience;
+    Line::connect(config).map_err(|error| match error {
+        bus::Error::Refused(refusal @ Refusal::Taken { .. }) => Failure::Unreachable(format!(
+            "{refusal} to this fleet: another run conducts it. Wait until that is over, or end it with: mission-control stop"
+        )),
+        error => Failure::Unreachable(error.to_string()),
+    })
+}
+
+/// Conducts the flight to its end; gives the line back.
+fn conduct(
+    plan: &Plan,
+    line: Line,
+    events: &Events<LineEvent>,
+    processes: &mut Processes,
+    collected: &Path,
+    stop: StopFlag,
+) -> (Ending, Line) {
+    let patience = plan.patience().map(|patience| Span::from_secs(patience.as_secs_f64()));
+    let conduct = Conduct::new(plan.mission.clone(), plan.pace, patience, !plan.is_own());
+    let port = ConductPort {
+        line,
+        own: plan.is_own(),
+        mission: plan.mission.clone(),
+        processes,
+        progress: Progress::new(plan.mission.end),
+        collected,
+        stop,
+        interrupted: false,
+        pace: plan.pace,
+        joined: false,
+        garbage: GarbageCount::default(),
+    };
+    let program = Shared::new(Program::new(conduct, port, Clock::from_now()));
+    let ending = drive(&program, events);
+    let port = program.into_port();
+    port.progress.done();
+    (ending, port.line)
+}
+
+/// Tells the fleet that everything of the flight is here, and leaves it.
+fn dismiss(line: Line) {
+    let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
+    line.close();
+}
+
+/// Leaves a fleet that has no log of the flight at all.
+fn nothing_recorded(folder: &Path, line: Option<Line>, landing: &Landing, ended_early: Vec<String>) -> Failure {
+    let missing: Vec<String> = landing.missing_logs().chain(ended_early).collect();
+    let why = format!("nothing was recorded: {}", missing.join(", "));
+    match line {
+        None => return Failure::Files(format!("{why}; see logs/ in {}", folder.display())),
+        // Nor will there ever be one: the next run of the mission must not look for it again.
+        Some(line) if landing.nobody_has_a_log() => dismiss(line),
+        Some(line) => line.close(),
+    }
+    Failure::Files(why)
+}
+
+/// A flight whose recording is on disk.
+struct Recorded {
+    /// How mission time passed: a flight that was joined or only collected may have been started by someone else.
+    pace: Pace,
+    /// Whether every vehicle flew to the end, and there are states of it up to there.
+    sound: bool,
+    /// What is missing, in words.
+    missing: Vec<String>,
+}
+
+/// Merges the logs into the folder's recording, and finds what is missing from it.
+fn merge_logs(
+    plan: &Plan,
+    folder: &Path,
+    logs: &[PathBuf],
+    landing: &Landing,
+    ended_early: Vec<String>,
+) -> Result<Recorded, Failure> {
+    let merged = merge(logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
+    let pace = landing.pace.unwrap_or(plan.pace);
+    let cut_short = missing::cut_short(&plan.mission, landing.phase, &merged);
+    let sound = landing.phase == Phase::Finished && landing.aborted.is_empty() && cut_short.is_empty();
+    let mut all: Vec<String> = landing.missing_logs().chain(ended_early).collect();
+    all.extend(missing::damage(&merged));
+    all.extend(missing::late_beginnings(&plan.mission, pace, &merged));
+    let untold = cut_short.into_iter().filter(|(id, _)| !missing::gave_up(&landing.aborted, id));
+    all.extend(untold.map(|(_, text)| text));
+    Ok(Recorded { pace, sound, missing: all })
+}
+
+impl Recorded {
+    /// What it was flown with.
+    fn host(self, own: bool, took: Duration, aborted: Vec<String>) -> HostFacts {
+        let how = format!("mission-control run{}{}", if own { "" } else { " --attach" }, option(self.pace));
+        let speed_up = match self.pace {
+            Pace::Real { speed_up } => Some(speed_up),
+            Pace::Stepped => None,
+        };
+        HostFacts::now(&how, speed_up, took.as_secs_f64(), self.missing, aborted)
+    }
 }
 
 /// The option with which `run` flies at this pace.
@@ -205,48 +270,6 @@ fn option(pace: Pace) -> String {
         Pace::Real { speed_up: 1.0 } => String::new(),
         Pace::Real { speed_up } => format!(" --speed-up {speed_up}"),
     }
-}
-
-/// Vehicles without states up to the end of the flight, in words: they were lost, or what they recorded was.
-fn cut_short(mission: &Mission, phase: Phase, merged: &Merged) -> Vec<(String, String)> {
-    let grace = mission.control_period * mission.record_ticks;
-    let of = |id: &str| match merged.spans.get(id) {
-        None => Some(format!("there are no states of {id}")),
-        Some((_, end)) if phase == Phase::Finished && Time::from_nanos(*end) + grace < mission.end => {
-            Some(format!("the states of {id} end at {}, before the flight did", Time::from_nanos(*end)))
-        }
-        Some(_) => None,
-    };
-    mission.vehicles.iter().filter_map(|vehicle| Some((vehicle.id.clone(), of(&vehicle.id)?))).collect()
-}
-
-/// Whether a vehicle is among those that gave up: its states end early, and that is told already.
-fn gave_up(aborted: &[String], id: &str) -> bool {
-    aborted.iter().any(|text| text.split(' ').next() == Some(id))
-}
-
-/// How late a vehicle may begin that did not begin in mid-flight \[s of wall clock\].
-const LATE_START_S: f64 = 0.5;
-
-/// Vehicles whose states begin in mid-flight, in words: an earlier life of theirs recorded elsewhere.
-fn late_beginnings(mission: &Mission, pace: Pace, merged: &Merged) -> Vec<String> {
-    // A busy machine misses the first control periods of a flight.
-    let grace = match pace {
-        Pace::Real { speed_up } => {
-            mission.control_period * mission.record_ticks + Span::from_secs(LATE_START_S * speed_up)
-        }
-        Pace::Stepped => Span::ZERO,
-    };
-    let begin = |id: &str| merged.spans.get(id).map(|(begin, _)| *begin);
-    let late = |id: &str| begin(id).filter(|begin| *begin > grace.nanos());
-    let late = mission.vehicles.iter().filter_map(|vehicle| Some((&vehicle.id, late(&vehicle.id)?)));
-    late.map(|(id, begin)| {
-        let begin = Time::from_nanos(begin);
-        format!(
-            "the log of {id} begins at {begin}: it has none of what {id} recorded before, in another folder perhaps"
-        )
-    })
-    .collect()
 }
 
 /// Who is not armed yet, and why, in words.
@@ -267,136 +290,14 @@ fn not_armed(mission: &Mission, status: &FleetStatus) -> String {
     if waiting.is_empty() { String::new() } else { format!("waiting for {}", waiting.join(", ")) }
 }
 
-// --- the processes of an own fleet -------------------------------------------------------------------------------------
-
-/// The processes of an own fleet, by name.
-#[derive(Default)]
-struct Processes {
-    running: BTreeMap<String, Child>,
-    ended: Vec<String>,
-}
-
-impl Processes {
-    /// Starts the emulator, then a process per vehicle. All are this very program under other names.
-    fn start(mission: &Mission, folder: &Path, listen: Option<Endpoint>) -> Result<(Endpoint, Processes), Failure> {
-        let logs = folder.join("logs");
-        fs::create_dir_all(&logs)
-            .map_err(|error| Failure::Files(format!("cannot make {}: {error}", logs.display())))?;
-        let mut processes = Processes::default();
-        let listen = listen.unwrap_or_else(|| {
-            let usual = Endpoint::local();
-            let free = TcpListener::bind((usual.host(), usual.port())).is_ok();
-            if free { usual } else { usual.with_port(0) }
-        });
-        let mut emulator = processes.spawn(&logs, "network-emulator", &["--listen", &listen.to_string()])?;
-        let mut endpoint = String::new();
-        let stdout = emulator.stdout.take();
-        if let Some(stdout) = stdout {
-            let _ = BufReader::new(stdout).read_line(&mut endpoint);
-        }
-        processes.running.insert("network-emulator".into(), emulator);
-        let endpoint: Endpoint = endpoint.trim().parse().map_err(|_| {
-            let _ = processes.end();
-            let log = logs.join("network-emulator.log");
-            let said = fs::read_to_string(&log).unwrap_or_default();
-            let last = said.lines().last().unwrap_or("it said nothing");
-            // Without instant and level: of the line in its log.
-            let why = last.split_once("ERROR ").map_or(last, |(_, why)| why).to_string();
-            // What it said is told; a folder with nothing else in it need not stay.
-            let _ = fs::remove_file(&log);
-            Failure::Unreachable(format!("the network-emulator did not come up: {why}"))
-        })?;
-        bus::remark!("network-emulator listens on {endpoint}; another terminal can use --attach {endpoint}");
-        for vehicle in &mission.vehicles {
-            let child = processes.spawn(&logs, &vehicle.id, &["--id", &vehicle.id, "--connect", &endpoint.to_string()]);
-            match child {
-                Ok(child) => processes.running.insert(vehicle.id.clone(), child),
-                Err(failure) => {
-                    let _ = processes.end();
-                    return Err(failure);
-                }
-            };
-        }
-        Ok((endpoint, processes))
-    }
-
-    fn spawn(&self, logs: &Path, name: &str, arguments: &[&str]) -> Result<Child, Failure> {
-        let failed = |error: std::io::Error| Failure::Unreachable(format!("cannot start {name}: {error}"));
-        let said = File::create(logs.join(format!("{name}.log"))).map_err(failed)?;
-        let program = if name == "network-emulator" { "network-emulator" } else { "vehicle-node" };
-        Command::new(std::env::current_exe().map_err(failed)?)
-            .arg(program)
-            .args(arguments)
-            .args(["--once", "--end-with-stdin"])
-            .args([std::ffi::OsStr::new("--logs"), logs.as_os_str()])
-            // A group of its own: what the terminal signals reaches mission-control, which ends the flight in order.
-            .process_group(0)
-            // Never written to: it is closed when this process is gone, however it went.
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(said)
-            .spawn()
-            .map_err(failed)
-    }
-
-    /// Processes that have ended since the last look, in words.
-    fn look(&mut self) -> Vec<String> {
-        let mut news = Vec::new();
-        self.running.retain(|name, child| match child.try_wait() {
-            Ok(Some(status)) => {
-                news.push(format!("{name} has ended ({status})"));
-                false
-            }
-            _ => true,
-        });
-        self.ended.extend(news.iter().cloned());
-        news
-    }
-
-    /// Asks all to end now: each closes its log first.
-    fn terminate(&self) {
-        for child in self.running.values() {
-            if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
-                let _ = kill_process(pid, Signal::TERM);
-            }
-        }
-    }
-
-    /// Waits for all to end, makes those that do not, and tells of those that ended early.
-    fn end(&mut self) -> Vec<String> {
-        let early = std::mem::take(&mut self.ended);
-        let deadline = Instant::now() + FAREWELL;
-        while !self.running.is_empty() && Instant::now() < deadline {
-            self.look();
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        for child in self.running.values_mut() {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-        self.running.clear();
-        early
-    }
-}
-
-impl Drop for Processes {
-    fn drop(&mut self) {
-        for child in self.running.values_mut() {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-    }
-}
-
-// --- the port ----------------------------------------------------------------------------------------------------------
-
 struct ConductPort<'p> {
     line: Line,
     own: bool,
     mission: Arc<Mission>,
     processes: &'p mut Processes,
     progress: Progress,
-    collected: PathBuf,
+    /// Where logs are collected.
+    collected: &'p Path,
     stop: StopFlag,
     interrupted: bool,
     pace: Pace,
@@ -436,8 +337,7 @@ impl ConductPort<'_> {
     /// Who is not there, in words. Of own processes, none that has ended is started again.
     fn away(&self, status: &FleetStatus) -> String {
         let away = status.vehicles.iter().filter(|v| !v.connected).map(|v| v.id.as_str());
-        let (lost, awaited): (Vec<&str>, Vec<&str>) =
-            away.partition(|id| self.own && !self.processes.running.contains_key(*id));
+        let (lost, awaited): (Vec<&str>, Vec<&str>) = away.partition(|id| self.own && !self.processes.is_running(id));
         let lost = lost.iter().map(|id| format!("; {id} is lost")).collect::<String>();
         let awaited =
             if awaited.is_empty() { awaited.concat() } else { format!("; waiting for {}", awaited.join(", ")) };
@@ -461,7 +361,7 @@ impl ConductPort<'_> {
     fn keep(&self, who: &str, piece: &LogPiece) -> Result<(), String> {
         let path = self.collected.join(format!("{who}-{}.mcap", piece.file + 1));
         let failed = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
-        fs::create_dir_all(&self.collected).map_err(failed)?;
+        fs::create_dir_all(self.collected).map_err(failed)?;
         let mut file =
             OpenOptions::new().create(true).write(true).truncate(piece.offset == 0).open(&path).map_err(failed)?;
         file.seek(SeekFrom::Start(piece.offset)).map_err(failed)?;
@@ -530,7 +430,7 @@ impl Port for ConductPort<'_> {
             self.progress.line("stopping the flight; once more ends at once");
             return Next::Feed(ConductInput::Interrupt);
         }
-        if self.own && !self.processes.running.contains_key(HUB) {
+        if self.own && !self.processes.has_hub() {
             // Nobody will start it again; what was recorded is worth a report.
             self.progress.line("the network-emulator has ended, and the flight with it");
             return Next::Exit(Ok(Landing {
@@ -540,8 +440,8 @@ impl Port for ConductPort<'_> {
                 aborted: Vec::new(),
             }));
         }
-        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended.is_empty() {
-            let ended = self.processes.ended.join(", ");
+        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended().is_empty() {
+            let ended = self.processes.ended().join(", ");
             return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
         }
         Next::Go

@@ -45,7 +45,10 @@ fn assert_flies(text: &str, vehicles: usize, links: usize) {
     assert_eq!(summary.warnings, Vec::<String>::new());
     let totals = summary.fleet.messages;
     // Said at 0, 0.1, ..., 0.5 s; without delay, what is said at the end has arrived.
-    assert_eq!((totals.sent, totals.delivered, totals.balanced), (6 * links as u64, 6 * links as u64, true));
+    assert_eq!(
+        (totals.counts.sent, totals.counts.delivered, totals.balanced),
+        (6 * links as u64, 6 * links as u64, true)
+    );
     assert!(summary.fleet.connectivity.is_some_and(|connectivity| connectivity.alpha == 0.0));
 }
 

@@ -73,10 +73,10 @@ fn with_heartbeat(heartbeat: &str) -> Summary {
 #[test]
 fn a_heartbeat_in_step_with_the_outages_is_never_heard_and_one_with_jitter_is() {
     let in_step = with_heartbeat("most_silence_s = 10.0");
-    assert_eq!(in_step.fleet.messages.delivered, 0);
+    assert_eq!(in_step.fleet.messages.counts.delivered, 0);
     assert_close("never closer", apart(&in_step), 7.0, 1e-6);
     let jittered = with_heartbeat("most_silence_s = 10.0\njitter = 0.5");
-    assert!(jittered.fleet.messages.delivered > 0 && apart(&jittered) < 3.0, "{}", apart(&jittered));
+    assert!(jittered.fleet.messages.counts.delivered > 0 && apart(&jittered) < 3.0, "{}", apart(&jittered));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use common::machine::Machine;
-use common::mission::{Mission, Start};
+use common::mission::{Mission, SharedMission, Start};
 use common::record::{Row, StateRow};
 use common::time::Time;
 use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
@@ -52,7 +52,7 @@ pub enum NodeOutput {
     /// Open a log for this mission and answer with [`NodeInput::LogOpened`].
     OpenLog {
         /// The mission.
-        mission: Opened,
+        mission: SharedMission,
         /// Whether the flight begins: what an earlier flight of the same mission left is set aside.
         fresh: bool,
     },
@@ -75,16 +75,6 @@ pub enum NodeOutput {
     },
     /// A line for people.
     Say(String),
-}
-
-/// A mission whose log is to be opened.
-#[derive(Clone, Debug)]
-pub struct Opened(pub Arc<Mission>);
-
-impl PartialEq for Opened {
-    fn eq(&self, other: &Self) -> bool {
-        self.0.digest == other.0.digest
-    }
 }
 
 /// A vehicle process as a pure machine.
@@ -204,7 +194,7 @@ impl VehicleNode {
 
     fn open_log(&mut self, fresh: bool) {
         if let Some(load) = &self.load {
-            let mission = Opened(load.mission.clone());
+            let mission = SharedMission(load.mission.clone());
             self.outputs.push_back(NodeOutput::OpenLog { mission, fresh });
         }
     }

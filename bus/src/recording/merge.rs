@@ -10,7 +10,6 @@ use common::record::{Name, Record, Row};
 use super::order::canonical_order;
 use super::read::RowReader;
 use super::recorder::Recorder;
-use super::topic::time_of;
 use super::{Cause, Origin, RecordingError, Result};
 
 /// Writes rows that come in order of time, and puts those of one instant in [canonical order](canonical_order).
@@ -42,7 +41,7 @@ impl<W: Write + Seek> CanonicalRecorder<W> {
     /// Takes a row. Its time must not lie before that of the row before it.
     pub fn write(&mut self, row: Row) -> Result<()> {
         if let Some(first) = self.instant.first() {
-            let (t_ns, reached_ns) = (time_of(&row), time_of(first));
+            let (t_ns, reached_ns) = (row.t_ns(), first.t_ns());
             if t_ns < reached_ns {
                 let cause = Cause::OutOfOrder { t_ns, reached_ns };
                 return Err(RecordingError { place: self.place.clone(), cause });
@@ -189,7 +188,7 @@ fn merge_in_stream<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged
     let mut spans = BTreeMap::new();
     // At each turn, the input whose next row is earliest; on a tie the first, so that input order is kept.
     while let Some(input) =
-        inputs.iter_mut().filter(|input| input.next.is_some()).min_by_key(|input| input.next.as_ref().map(time_of))
+        inputs.iter_mut().filter(|input| input.next.is_some()).min_by_key(|input| input.next.as_ref().map(Row::t_ns))
     {
         if let Some(row) = input.next.take() {
             note_span(&mut spans, &row);

@@ -37,7 +37,6 @@ pub use merge::{CanonicalRecorder, Merged, Recovered, merge, recover};
 pub use order::{canonical_order, canonical_order_of_records};
 pub use read::{Recording, RowReader, read, read_from};
 pub use recorder::{FLUSH_PERIOD, Recorder};
-pub(crate) use topic::time_of;
 pub use topic::topic_of;
 
 use std::fmt;

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use common::record::{ClockRecord, Record, Row};
 
-use super::topic::{Topic, time_of};
+use super::topic::Topic;
 
 /// Orders rows by mission time, then topic (speed, topology, states, messages,
 /// warnings, then the clock topics), then vehicle or
@@ -29,7 +29,7 @@ fn key(row: &Row) -> Key<'_> {
         Row::Clock(ClockRecord::Note(row)) => (&row.source, &row.text, 0),
         Row::Clock(ClockRecord::Overrun(row)) => (&row.vehicle, "", row.place as u64),
     };
-    (time_of(row), Topic::of(row), first, second, number)
+    (row.t_ns(), Topic::of(row), first, second, number)
 }
 
 fn exact_key(record: &Record) -> Key<'_> {

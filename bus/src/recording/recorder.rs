@@ -11,7 +11,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 
 use super::packed::Pack;
-use super::topic::{Topic, is_finite, time_of};
+use super::topic::{Topic, is_finite};
 use super::{Cause, Origin, RecordingError, Result};
 
 /// At most this much wall clock lies between two flushes by [`Recorder::flush_if_due`].
@@ -199,7 +199,7 @@ impl<W: Write + Seek> Recorder<W> {
     fn write_finite(&mut self, row: &Row) -> mcap::McapResult<()> {
         self.json.clear();
         Topic::encode(row, &mut self.json).map_err(std::io::Error::from)?;
-        let t_ns = time_of(row);
+        let t_ns = row.t_ns();
         let log_time = u64::try_from(t_ns).unwrap_or(0);
         let channel = match row {
             Row::Exact(Record::State(state)) => self.vehicle_channel(&state.vehicle)?,

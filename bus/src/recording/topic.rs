@@ -138,17 +138,6 @@ pub fn topic_of(row: &Row) -> Cow<'static, str> {
     Topic::of(row).name(vehicle)
 }
 
-/// When the row was written, in mission time \[ns\].
-pub(crate) fn time_of(row: &Row) -> i64 {
-    match row {
-        Row::Exact(record) => record.t_ns(),
-        Row::Clock(ClockRecord::Achieved(row)) => row.t_ns,
-        Row::Clock(ClockRecord::Ticks(row)) => row.t_ns,
-        Row::Clock(ClockRecord::Note(row)) => row.t_ns,
-        Row::Clock(ClockRecord::Overrun(row)) => row.t_ns,
-    }
-}
-
 /// Whether every number in the row can be written as JSON.
 pub(super) fn is_finite(row: &Row) -> bool {
     match row {

@@ -32,6 +32,13 @@ impl Disagreement {
     }
 }
 
+/// ‖(I − 11ᵀ/n) x‖, the norm of what the coordination states x of a fleet differ from their mean by; zero without vehicles.
+pub fn of_fleet(states: impl Iterator<Item = f64> + Clone) -> f64 {
+    let (sum, count) = states.clone().fold((0.0, 0u32), |(sum, count), x| (sum + x, count + 1));
+    let mean = sum / f64::from(count.max(1));
+    states.map(|x| (x - mean) * (x - mean)).sum::<f64>().sqrt()
+}
+
 /// C_ii = 1/R_i; zero where R_i is not positive, which no path of this crate has.
 pub fn c(own: &Own) -> f64 {
     if own.r > 0.0 { own.r.recip() } else { 0.0 }
@@ -39,11 +46,17 @@ pub fn c(own: &Own) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Disagreement, c};
+    use super::{Disagreement, c, of_fleet};
     use crate::coordination::{Neighbour, Own};
 
     fn own() -> Own {
         Own { xi: 3.0, eta: 0.5, r: 2.0, ..Own::default() }
+    }
+
+    #[test]
+    fn a_fleet_differs_by_the_norm_of_the_differences_from_its_mean() {
+        assert_eq!(of_fleet([5.0, 1.0, 3.0, 3.0].into_iter()), 8f64.sqrt());
+        assert_eq!((of_fleet([7.0].into_iter()), of_fleet(std::iter::empty())), (0.0, 0.0));
     }
 
     #[test]

@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
-use super::robot::SpeedLoop;
-use super::{Craft, Limits, Observation, REFUSED, SATURATED, SINGULAR, Warning, limited};
+use super::speed_loop::SpeedLoop;
+use super::{Craft, Limits, Observation, REFUSED, SATURATED, SINGULAR, Warning, check_plane, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::{Bend, Errors, Motion, Sense};
 use crate::following::proposition_3_3::{Proposition33, WantedSlip};
-use crate::path::shape::is_planar;
 use crate::path::{Path, PathPoint};
 use crate::positive::{finite, positive};
 use crate::time::Time;
@@ -106,21 +105,13 @@ impl MarineCraft {
         state: State,
         xi: f64,
     ) -> Result<MarineCraft, String> {
-        if !is_planar(&*path) {
-            return Err("a marine vehicle follows paths in a horizontal plane only".to_owned());
-        }
-        if let [corner, ..] = path.tangent_breaks() {
-            return Err(format!("a marine vehicle cannot follow the corner of its path at xi = {corner}"));
-        }
-        if let SpeedLoop::Rate { k_0 } = speed_loop {
-            positive("the gain k_0", k_0)?;
-        }
+        check_plane(&*path, "a marine vehicle")?;
         state.to_vector().iter().try_for_each(|&x| finite("the vehicle's state", x).map(drop))?;
         let target = path.at(finite("the vehicle's xi", xi)?);
         Ok(MarineCraft {
             path,
             law,
-            speed_loop,
+            speed_loop: speed_loop.checked()?,
             side_slip: side_slip.checked()?,
             parameters: parameters.checked()?,
             state,
@@ -191,10 +182,7 @@ impl Craft for MarineCraft {
     fn own(&self, reference: SpeedReference) -> Own {
         let (r, state) = (self.target.r(), self.measured());
         let flow = self.flow(&state);
-        let eta = match self.speed_loop {
-            SpeedLoop::Acceleration => flow.v_t - r * reference.v_l,
-            SpeedLoop::Rate { .. } => 0.0,
-        };
+        let eta = self.speed_loop.eta(flow.v_t, r, reference);
         let xi_rate = self.law.target_speed(&self.errors(&state, &flow), flow.v_t) / r;
         let r_dot = self.target.dr_dxi() * xi_rate;
         Own { xi: self.xi, eta, r, v: flow.v_t, r_dot, ..Own::default() }

@@ -8,14 +8,19 @@
 //! | robot | dynamic unicycle (3.12) | Proposition 3.1 or 3.2 | acceleration (3.39), or rate (4.21) | [`robot`] |
 //! | marine | fully actuated vehicle (3.28) | Proposition 3.3 | acceleration (3.39), or rate (4.21) | [`marine`] |
 //! | underactuated body in space | 6-DOF (4.44), (4.45) | Theorem 4.7 | rate | [`auv`] |
+//!
+//! How those that take either answer a demand is in [`speed_loop`].
 
 pub mod auv;
 pub mod kinematic;
 pub mod marine;
 pub mod robot;
+pub mod speed_loop;
 pub mod trimming;
 
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
+use crate::path::Path;
+use crate::path::shape::is_planar;
 use crate::vehicle::environment::Conditions;
 
 /// What a craft tells for the record; angles in radians, lengths in metres.
@@ -65,6 +70,17 @@ pub const SINGULAR: &str = "too slow to have a side-slip, the wanted one was tak
 /// An effort within ±`limit`, and whether that took something of it.
 fn limited(effort: f64, limit: f64) -> (f64, bool) {
     if effort.abs() > limit { (limit.copysign(effort), true) } else { (effort, false) }
+}
+
+/// Refuses a path that leaves its horizontal plane or has a corner, for a vehicle that is called this.
+fn check_plane(path: &dyn Path, who: &str) -> Result<(), String> {
+    if !is_planar(path) {
+        return Err(format!("{who} follows paths in a horizontal plane only"));
+    }
+    match path.tangent_breaks() {
+        [corner, ..] => Err(format!("{who} cannot follow the corner of its path at xi = {corner}")),
+        [] => Ok(()),
+    }
 }
 
 /// The vehicle was at or beyond its path's centre of curvature, where the closest point is not unique.

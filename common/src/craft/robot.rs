@@ -2,72 +2,16 @@
 
 use std::sync::Arc;
 
-use super::{Craft, Limits, Observation, REFUSED, SATURATED, Warning, limited};
+use super::speed_loop::SpeedLoop;
+use super::{Craft, Limits, Observation, REFUSED, SATURATED, Warning, check_plane, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::{Bend, Errors, Gains, Motion, Proposition31, Sense, Steering};
 use crate::following::proposition_3_2::Proposition32;
-use crate::path::shape::is_planar;
 use crate::path::{Path, PathPoint};
-use crate::positive::{finite, positive};
+use crate::positive::finite;
 use crate::vehicle::dynamic_unicycle::{Input, Parameters, State, model};
 use crate::vehicle::environment::Conditions;
 use crate::vehicle::integrate::advance;
-
-/// What coordination commands: the mission's choice of law decides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SpeedLoop {
-    /// The derivative of the speed-tracking error, (3.39): laws of chapter 3.
-    Acceleration,
-    /// The rate v_r of the virtual target, (4.21): the robot's speed is driven to R v_r.
-    Rate {
-        /// k₀, rate at which the speed comes to R v_r \[1/s\], positive; well above the gain of coordination.
-        k_0: f64,
-    },
-}
-
-impl SpeedLoop {
-    /// The kind of demand that it answers.
-    pub fn takes(self) -> DemandKind {
-        match self {
-            SpeedLoop::Acceleration => DemandKind::Acceleration,
-            SpeedLoop::Rate { .. } => DemandKind::Rate,
-        }
-    }
-
-    /// The forward acceleration F/m that `demand` asks for, the speed that is wanted, and the rate that is recorded;
-    /// nothing if the demand is of the other kind.
-    pub(super) fn answer(
-        self,
-        demand: Demand,
-        reference: SpeedReference,
-        target: &PathPoint,
-        v: f64,
-        xi_rate: f64,
-    ) -> Option<Answer> {
-        let (r, r_dot) = (target.r(), target.dr_dxi() * xi_rate);
-        let SpeedReference { v_l, v_l_dot } = reference;
-        match (self, demand) {
-            // F/m = u + R'(ξ) ξ̇ v_L + R v̇_L with the actual ξ̇ (3.39), erratum 3.7.
-            (SpeedLoop::Acceleration, Demand::Acceleration(u)) => {
-                Some(Answer { v_dot: u + r_dot * v_l + r * v_l_dot, wanted: r * v_l, v_ref: v_l })
-            }
-            // The sense of travel of a robot that may not be told v_L is its own.
-            (SpeedLoop::Acceleration, Demand::Forward(v_dot)) => Some(Answer { v_dot, wanted: v, v_ref: v_l }),
-            // F/m = d/dt(R v_r) − k₀ (v − R v_r); the derivative of v_r itself is not known and left out.
-            (SpeedLoop::Rate { k_0 }, Demand::Rate(v_r)) => {
-                Some(Answer { v_dot: r_dot * v_r - k_0 * (v - r * v_r), wanted: r * v_r, v_ref: v_r })
-            }
-            _ => None,
-        }
-    }
-}
-
-/// See [`SpeedLoop::answer`].
-pub(super) struct Answer {
-    pub(super) v_dot: f64,
-    pub(super) wanted: f64,
-    pub(super) v_ref: f64,
-}
 
 /// The path-following laws of wheeled robots.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,21 +102,13 @@ impl RobotCraft {
         state: State,
         xi: f64,
     ) -> Result<RobotCraft, String> {
-        if !is_planar(&*path) {
-            return Err("a wheeled robot follows paths in a horizontal plane only".to_owned());
-        }
-        if let [corner, ..] = path.tangent_breaks() {
-            return Err(format!("a wheeled robot cannot follow the corner of its path at xi = {corner}"));
-        }
-        if let SpeedLoop::Rate { k_0 } = speed_loop {
-            positive("the gain k_0", k_0)?;
-        }
+        check_plane(&*path, "a wheeled robot")?;
         state.to_vector().iter().try_for_each(|&x| finite("the robot's state", x).map(drop))?;
         let (target, parameters) = (path.at(finite("the robot's xi", xi)?), parameters.checked()?);
         Ok(RobotCraft {
             path,
             law: law.into(),
-            speed_loop,
+            speed_loop: speed_loop.checked()?,
             parameters,
             state,
             xi,
@@ -235,10 +171,7 @@ impl Craft for RobotCraft {
     /// With η = v − R v_L (3.38), or zero for a robot that takes a rate.
     fn own(&self, reference: SpeedReference) -> Own {
         let (r, state) = (self.target.r(), self.measured());
-        let eta = match self.speed_loop {
-            SpeedLoop::Acceleration => state.speed - r * reference.v_l,
-            SpeedLoop::Rate { .. } => 0.0,
-        };
+        let eta = self.speed_loop.eta(state.speed, r, reference);
         let xi_rate = self.law.target_speed(&self.errors(&state), state.speed) / r;
         let r_dot = self.target.dr_dxi() * xi_rate;
         Own { xi: self.xi, eta, r, v: state.speed, r_dot, ..Own::default() }
@@ -326,12 +259,13 @@ mod tests {
     use nalgebra::Vector3;
     use proptest::prelude::*;
 
-    use super::{RobotCraft, SpeedLoop};
+    use super::RobotCraft;
     use crate::coordination::solution_1_3_43::SolutionOne;
     use crate::coordination::solution_2_3_44::SolutionTwo;
     use crate::coordination::solution_3_3_45::SolutionThree;
     use crate::coordination::switching_4_21::Switching;
     use crate::coordination::{CoordinationLaw, Demand, DemandKind, Neighbour, SpeedReference};
+    use crate::craft::speed_loop::SpeedLoop;
     use crate::craft::{Craft, Limits, REFUSED, Warning};
     use crate::following::proposition_3_1::{Approach, Bend, Gains, Motion, Proposition31};
     use crate::path::chain::{Chain, Segment};

@@ -8,15 +8,15 @@ use std::sync::Arc;
 
 use nalgebra::{SVector, Vector2};
 
-use super::robot::{SpeedLoop, measured};
-use super::{AT_CENTRE, Craft, LIMITED, Limits, Observation, REFUSED, SATURATED, Warning, limited};
+use super::robot::measured;
+use super::speed_loop::SpeedLoop;
+use super::{AT_CENTRE, Craft, LIMITED, Limits, Observation, REFUSED, SATURATED, Warning, check_plane, limited};
 use crate::coordination::{Demand, DemandKind, Own, SpeedReference};
 use crate::following::proposition_3_1::Errors;
 use crate::following::trimming::{Deviation, TrimmingLaw, Turning};
 use crate::path::Path;
 use crate::path::foot::Foot;
-use crate::path::shape::is_planar;
-use crate::positive::{finite, positive};
+use crate::positive::finite;
 use crate::vehicle::dynamic_unicycle::{Input, Parameters, State, model};
 use crate::vehicle::environment::Conditions;
 use crate::vehicle::integrate::advance;
@@ -55,21 +55,13 @@ impl TrimmingCraft {
         state: State,
         xi: f64,
     ) -> Result<TrimmingCraft, String> {
-        if !is_planar(&*path) {
-            return Err("a wheeled robot follows paths in a horizontal plane only".to_owned());
-        }
-        if let [corner, ..] = path.tangent_breaks() {
-            return Err(format!("a wheeled robot cannot follow the corner of its path at xi = {corner}"));
-        }
-        if let SpeedLoop::Rate { k_0 } = speed_loop {
-            positive("the gain k_0", k_0)?;
-        }
+        check_plane(&*path, "a wheeled robot")?;
         state.to_vector().iter().try_for_each(|&x| finite("the robot's state", x).map(drop))?;
         let foot = Foot::locate(&*path, Vector2::new(state.x, state.y), finite("the robot's xi", xi)?);
         Ok(TrimmingCraft {
             path,
             law,
-            speed_loop,
+            speed_loop: speed_loop.checked()?,
             parameters: parameters.checked()?,
             state,
             foot,
@@ -133,10 +125,7 @@ impl Craft for TrimmingCraft {
     fn own(&self, reference: SpeedReference) -> Own {
         let (state, point) = (self.measured(), &self.believed.point);
         let r = point.r();
-        let eta = match self.speed_loop {
-            SpeedLoop::Acceleration => state.speed - r * reference.v_l,
-            SpeedLoop::Rate { .. } => 0.0,
-        };
+        let eta = self.speed_loop.eta(state.speed, r, reference);
         let r_dot = point.dr_dxi() * TrimmingCraft::xi_rate(&self.believed, &state);
         Own { xi: self.believed.xi, eta, r, v: state.speed, r_dot, ..Own::default() }
     }

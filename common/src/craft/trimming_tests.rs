@@ -10,7 +10,7 @@ use crate::coordination::prescribed_2_6::{Alone, SquareWave};
 use crate::coordination::recruiting::Gains;
 use crate::coordination::solution_2_3_44::SolutionTwo;
 use crate::coordination::{Demand, FleetLaw, Neighbour, SpeedReference, VehicleLaw};
-use crate::craft::robot::SpeedLoop;
+use crate::craft::speed_loop::SpeedLoop;
 use crate::craft::{AT_CENTRE, Craft, Limits};
 use crate::following::decoupling_2_14::Decoupling;
 use crate::following::h2_figure_2_4::Disturbances;

@@ -127,6 +127,16 @@ pub fn digest(text: &str) -> u64 {
     u64::from_le_bytes(std::array::from_fn(|i| hash[i]))
 }
 
+/// A mission in what a machine wants done, which must be comparable: it is the same if its file is.
+#[derive(Clone, Debug)]
+pub struct SharedMission(pub Arc<Mission>);
+
+impl PartialEq for SharedMission {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.digest == other.0.digest
+    }
+}
+
 impl Mission {
     /// Reads and checks a mission file; `name` is what the faults call it.
     ///

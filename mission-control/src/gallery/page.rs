@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use crate::results::report::{STYLE, escape, number};
+use crate::results::html::{STYLE, escape, number, table};
 
 use super::file::{Expectation, FigureSection, GalleryFile};
 use super::numbers::Verdict;
@@ -128,7 +128,7 @@ pub(super) fn html(file: &GalleryFile, shown: &[Shown<'_>], folder: &str) -> Str
             let _ = writeln!(page, "<p class=\"note\">{}</p>", escape(note));
         }
         if !shown.verdicts.is_empty() {
-            crate::results::report::table(&mut page, "numbers", &HEADER, shown.rows().map(Vec::from));
+            table(&mut page, "numbers", &HEADER, shown.rows().map(Vec::from));
         }
         let _ = writeln!(page, "<pre><code>{}</code></pre>\n</section>", escape(&shown.commands(folder)));
     }

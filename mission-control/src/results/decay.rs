@@ -5,7 +5,7 @@
 use common::record::{Record, SpeedRow};
 
 use super::Facts;
-use super::report::number;
+use super::html::number;
 use super::series::{Coordination, speeds};
 use super::statistics::{ExponentialFit, fit_coordination};
 

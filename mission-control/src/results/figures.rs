@@ -19,10 +19,10 @@ use super::decay::{Decay, fitted_where};
 use super::drawing::{
     Drawing, OUTAGE, OUTAGE_LIMIT, PAPER, PLANNED, Panel, SAMPLES, colour, extremes, render, subscript,
 };
+use super::html::number;
 use super::network::Network;
-use super::report::number;
 use super::series::{Coordination, Track, tracks, unbroken};
-use super::summary::thinned;
+use super::statistics::thinned;
 
 /// One figure.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,6 +11,8 @@
 //! | [`diff()`], [`compare()`] | *equal*, or the first row in which two runs part |
 
 mod chart;
+mod clock;
+mod coordination;
 mod decay;
 mod diff;
 pub(crate) mod drawing;
@@ -19,31 +21,36 @@ mod facts;
 mod figures;
 mod folder;
 mod graph;
+pub(crate) mod html;
 mod legend;
+mod links;
 pub(crate) mod network;
 mod punctuality;
-pub(crate) mod report;
+mod report;
 mod series;
 pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]
 pub(crate) mod testing;
 mod trace;
+mod vehicle;
+mod verdict;
 
 pub use chart::{Chart, Curve};
+pub use clock::{ClockSummary, DeadlineSummary, DeliverySummary, NoteSummary, OverrunSummary, summarise_clock};
+pub use coordination::CoordinationSummary;
 pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts, Way};
 pub use figures::{Figure, figures};
 pub use folder::{Account, Theory, write_run_folder};
 pub use graph::{GraphFacts, SpanningFacts, SplitFacts, TakenFacts};
-pub use network::{Connectivity, LinkSummary, Network, Spread};
+pub use links::{LinkSummary, MessageCounts, Spread};
+pub use network::{Connectivity, Network};
 pub use punctuality::ClockVerdict;
 pub use report::{BELOW, Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
 pub use statistics::{ExponentialFit, FIT_PART, fit_coordination, fit_exponential, settling_time};
-pub use summary::{
-    Absence, ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals,
-    NoteSummary, OverrunSummary, Summary, VehicleSummary, summarise, summarise_clock,
-};
+pub use summary::{Absence, FleetSummary, MessageTotals, Summary, summarise};
 pub use trace::network_section;
+pub use vehicle::VehicleSummary;

@@ -1,188 +1,21 @@
-//! What became of the messages, and when the links were up.
+//! When the links were up, and how connected that left the fleet.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
+use common::graph::{Graph, measure};
 use common::record::{Fate, MessageRow, Record};
+use common::time::{Span, Time};
 use serde::Serialize;
 
 use super::Facts;
-use super::statistics::{largest, quantile, sorted};
-
-/// The messages of one directed link.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct LinkSummary {
-    /// The sender.
-    pub from: String,
-    /// The receiver.
-    pub to: String,
-    /// Messages that the emulator took for this link.
-    pub sent: u64,
-    /// Handed to the receiver.
-    pub delivered: u64,
-    /// Lost by the loss model.
-    pub lost: u64,
-    /// Dropped because the link was down.
-    pub link_down: u64,
-    /// Dropped because the queue was full.
-    pub queue_full: u64,
-    /// Dropped because the receiver was too far away.
-    pub out_of_range: u64,
-    /// Dropped because the receiver was speaking itself.
-    pub half_duplex: u64,
-    /// Dropped because another message arrived at the same time.
-    pub collision: u64,
-    /// Handed over with a flipped bit, and dropped by the receiver.
-    pub corrupt: u64,
-    /// Dropped because there was no process of the receiver.
-    pub receiver_absent: u64,
-    /// Under way when the mission ended.
-    pub in_flight: u64,
-    /// Second copies handed to the receiver; they do not count as sent.
-    pub copied: u64,
-    /// Second copies that did not get there.
-    pub copy_dropped: u64,
-    /// Second copies under way when the mission ended.
-    pub copy_in_flight: u64,
-    /// Sequence numbers between the first and the last of a sender's life that have no row.
-    pub missing: u64,
-    /// Messages with more than one row.
-    pub repeated: u64,
-    /// Whether every message has one fate: sent = delivered + dropped + in flight, none missing, none repeated.
-    pub balanced: bool,
-    /// Size of what was delivered, without copies \[bytes\].
-    pub delivered_bytes: u64,
-    /// Commanded delay of what was delivered \[s\].
-    pub delay: Option<Spread>,
-    /// Part of the time that the link was up.
-    pub up_fraction: f64,
-    /// The longest time that it was down \[s\].
-    pub longest_outage_s: f64,
-}
-
-/// Median, 99th percentile and maximum.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
-    /// Half of the values are at or below this.
-    pub median: f64,
-    /// 99 % of the values are at or below this.
-    pub p99: f64,
-    /// The largest value.
-    pub max: f64,
-}
-
-impl Spread {
-    /// The spread of some values; `None` if there are none.
-    pub(super) fn of(values: &[f64]) -> Option<Spread> {
-        let ascending = sorted(values);
-        let max = *ascending.last()?;
-        Some(Spread { median: quantile(&ascending, 0.5)?, p99: quantile(&ascending, 0.99)?, max })
-    }
-}
-
-/// Every directed link's messages and up times: the links of the mission first, then others that have rows.
-pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<LinkSummary> {
-    let mut messages: BTreeMap<(&str, &str), Vec<&MessageRow>> = BTreeMap::new();
-    for record in exact {
-        if let Record::Message(row) = record {
-            messages.entry((&row.from, &row.to)).or_default().push(row);
-        }
-    }
-    let named: Vec<(&str, &str)> = facts.links.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect();
-    let known: BTreeSet<(&str, &str)> = named.iter().copied().collect();
-    let others = messages.keys().copied().filter(|link| !known.contains(link)).collect::<Vec<_>>();
-    let all = named.into_iter().chain(others);
-    all.map(|(from, to)| {
-        let rows = messages.get(&(from, to)).map_or(&[][..], Vec::as_slice);
-        let summary = ledger(rows, facts.bytes_of(from));
-        let down = network.down_times(from, to);
-        let duration = network.end_s - network.start_s;
-        let down_s: f64 = down.iter().map(|(from, to)| to - from).sum();
-        LinkSummary {
-            from: from.to_owned(),
-            to: to.to_owned(),
-            up_fraction: if duration > 0.0 { 1.0 - down_s / duration } else { 1.0 },
-            longest_outage_s: largest(down.iter().map(|(from, to)| to - from)),
-            ..summary
-        }
-    })
-    .collect()
-}
-
-fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
-    let count = |fate| rows.iter().filter(|row| row.fate == fate).count() as u64;
-    // Copies were sent by nobody: they have no part in the ledger of what was sent.
-    let sent = rows.iter().filter(|row| !row.fate.is_of_copy());
-    let mut in_order: Vec<(i64, u64)> = sent.map(|row| (row.sent_ns, row.seq)).collect();
-    in_order.sort_unstable();
-    let (mut missing, mut repeated) = (0, 0);
-    for pair in in_order.windows(2) {
-        if pair[0] == pair[1] {
-            repeated += 1;
-        } else if pair[1].1 > pair[0].1 {
-            // A number that does not rise begins a new life of the sender.
-            missing += pair[1].1 - pair[0].1 - 1;
-        }
-    }
-    let delays =
-        rows.iter().filter(|row| row.fate == Fate::Delivered).map(|row| (row.due_ns - row.sent_ns) as f64 / 1e9);
-    let delivered = count(Fate::Delivered);
-    let summary = LinkSummary {
-        sent: in_order.len() as u64 - repeated,
-        delivered,
-        lost: count(Fate::Lost),
-        link_down: count(Fate::LinkDown),
-        queue_full: count(Fate::QueueFull),
-        in_flight: count(Fate::InFlight),
-        out_of_range: count(Fate::OutOfRange),
-        half_duplex: count(Fate::HalfDuplex),
-        collision: count(Fate::Collision),
-        corrupt: count(Fate::Corrupt),
-        receiver_absent: count(Fate::ReceiverAbsent),
-        copied: count(Fate::Copied),
-        copy_dropped: count(Fate::CopyDropped),
-        copy_in_flight: count(Fate::CopyInFlight),
-        missing,
-        repeated,
-        delivered_bytes: delivered * message_bytes,
-        delay: Spread::of(&delays.collect::<Vec<_>>()),
-        ..LinkSummary::default()
-    };
-    let dropped: u64 = Fate::DROPS.iter().map(|cause| count(*cause)).sum();
-    let accounted = summary.delivered + dropped + summary.in_flight;
-    LinkSummary { balanced: summary.sent == accounted && missing == 0 && repeated == 0, ..summary }
-}
-
-/// Number of transmissions by sender: a message to several receivers goes on the air once, and one that found no place in its
-/// sender's queue, or still waited there at the end, never.
-pub(super) fn transmissions(exact: &[Record]) -> BTreeMap<&str, u64> {
-    let mut sent: Vec<(&str, i64, u64)> = exact
-        .iter()
-        .filter_map(|record| match record {
-            Record::Message(row) if was_on_air(row) => Some((&*row.from, row.sent_ns, row.seq)),
-            _ => None,
-        })
-        .collect();
-    sent.sort_unstable();
-    sent.dedup();
-    let mut by_sender = BTreeMap::new();
-    sent.iter().for_each(|(from, ..)| *by_sender.entry(*from).or_default() += 1);
-    by_sender
-}
-
-/// What never left its sender has no instant at which it was to arrive: it stands as due when that was decided.
-fn was_on_air(row: &MessageRow) -> bool {
-    !([Fate::QueueFull, Fate::InFlight].contains(&row.fate) && row.due_ns == row.t_ns)
-}
 
 /// The links over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Network {
-    /// Start of the observation \[s\].
-    pub start_s: f64,
-    /// Its end \[s\].
-    pub end_s: f64,
-    /// Instants of changes \[s\] for each link, with the new state.
-    changes: BTreeMap<(String, String), Vec<(f64, bool)>>,
+    /// The end of the observation, which begins at zero.
+    pub(super) end: Time,
+    /// For each link, the instants at which it changed, in order, with whether it was up from then on.
+    changes: BTreeMap<(String, String), Vec<(Time, bool)>>,
 }
 
 /// Connectivity over time, measured as the theory of chapter 4 wants it.
@@ -241,36 +74,37 @@ impl Network {
     /// The links over \[0, `duration`\]. A link whose first change is to go down was up before, and a link of which
     /// nothing is said was up all the time.
     pub fn of(exact: &[Record], facts: &Facts) -> Network {
-        let mut changes: BTreeMap<(String, String), Vec<(f64, bool)>> = BTreeMap::new();
+        let end = Time::from_secs(facts.duration_s);
+        let mut changes: BTreeMap<(String, String), Vec<(Time, bool)>> = BTreeMap::new();
         for link in &facts.links {
             changes.entry(link.clone()).or_default();
         }
         for record in exact {
             if let Record::Topology(row) = record {
-                let at = (row.t_ns as f64 / 1e9).clamp(0.0, facts.duration_s);
+                let at = Time::from_nanos(row.t_ns).clamp(Time::ZERO, end);
                 changes.entry((row.from.to_string(), row.to.to_string())).or_default().push((at, row.up));
             }
         }
-        changes.values_mut().for_each(|changes| changes.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        Network { start_s: 0.0, end_s: facts.duration_s, changes }
+        changes.values_mut().for_each(|changes| changes.sort_by_key(|(at, _)| *at));
+        Network { end, changes }
     }
 
     /// When a link was down, as intervals (from, to) \[s\].
     pub fn down_times(&self, from: &str, to: &str) -> Vec<(f64, f64)> {
         let changes = self.changes.get(&(from.to_owned(), to.to_owned())).map_or(&[][..], Vec::as_slice);
-        let mut since = changes.first().filter(|first| first.1).map(|_| self.start_s);
+        let mut since = changes.first().filter(|first| first.1).map(|_| 0.0);
         let mut down = Vec::new();
         for (at, up) in changes {
             match (since, up) {
                 (Some(start), true) => {
-                    down.push((start, *at));
+                    down.push((start, at.secs()));
                     since = None;
                 }
-                (None, false) => since = Some(*at),
+                (None, false) => since = Some(at.secs()),
                 _ => {}
             }
         }
-        down.extend(since.map(|start| (start, self.end_s)));
+        down.extend(since.map(|start| (start, self.end.secs())));
         down.retain(|(from, to)| to > from);
         down
     }
@@ -290,65 +124,83 @@ impl Network {
 
     /// The measured connectivity; `None` for fewer than two vehicles or no time.
     pub fn connectivity(&self, facts: &Facts) -> Option<Connectivity> {
-        let count = facts.vehicles.len();
-        let pieces = self.pieces(facts);
-        if count < 2 || pieces.is_empty() {
+        let measured = self.measured(facts);
+        let length = measured.length();
+        if facts.vehicles.len() < 2 || length <= Span::ZERO {
             return None;
         }
-        let connected: Vec<bool> = pieces.iter().map(|piece| has_root(count, &piece.edges)).collect();
-        let lost = |index: usize| if connected[index] { 0.0 } else { pieces[index].length_s };
-        let alpha = (0..pieces.len()).map(lost).sum::<f64>() / (self.end_s - self.start_s);
-        // T_0 from the largest rise of ∫(p − α) between two instants.
-        let (mut value, mut lowest, mut rise) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for (index, piece) in pieces.iter().enumerate() {
-            value += lost(index) - alpha * piece.length_s;
-            lowest = lowest.min(value);
-            rise = rise.max(value - lowest);
-        }
-        let t_0_s = (alpha < 1.0).then(|| rise / (1.0 - alpha));
-        let length_s = self.end_s - self.start_s;
+        let alpha = measured.loss_fraction();
         Some(Connectivity {
             alpha,
-            t_0_s,
-            t_s: union_period(count, &pieces, &connected),
-            length_s,
-            dwell_s: dwell(&pieces).unwrap_or(length_s),
-            shortest_up_s: length_s,
+            t_0_s: (alpha < 1.0).then(|| measured.t_0(alpha).secs()),
+            t_s: measured.connected_in_mean().map(Span::secs),
+            length_s: length.secs(),
+            dwell_s: measured.dwell().unwrap_or(length).secs(),
+            shortest_up_s: length.secs(),
             oldest_news_s: None,
             unheard: 0.0,
         })
     }
 
+    /// The graph of who hears whom, measured over the run.
+    fn measured(&self, facts: &Facts) -> measure::Connectivity {
+        let numbers = facts.vehicles.iter().zip(0..).map(|(vehicle, number)| (vehicle.id.as_str(), number));
+        let numbers: BTreeMap<&str, usize> = numbers.collect();
+        let mut graph = Graph::empty(facts.vehicles.len());
+        let mut events: Vec<(Time, usize, usize, bool)> = Vec::new();
+        for ((from, to), changes) in &self.changes {
+            let (Some(&sender), Some(&receiver)) = (numbers.get(from.as_str()), numbers.get(to.as_str())) else {
+                continue;
+            };
+            graph.set(receiver, sender, changes.first().is_none_or(|(_, up)| !up));
+            events.extend(changes.iter().map(|(at, up)| (*at, receiver, sender, *up)));
+        }
+        events.sort_by_key(|(at, ..)| *at);
+        // What changes at the begin was so from the begin, and what changes at the end was never seen.
+        let begun = events.partition_point(|(at, ..)| *at <= Time::ZERO);
+        let over = events.partition_point(|(at, ..)| *at < self.end).max(begun);
+        let mut measured = measure::Connectivity::new();
+        for at_once in std::iter::once(&events[..begun]).chain(events[begun..over].chunk_by(|a, b| a.0 == b.0)) {
+            for (_, receiver, sender, up) in at_once {
+                graph.set(*receiver, *sender, *up);
+            }
+            measured.graph(at_once.first().map_or(Time::ZERO, |(at, ..)| *at), graph.clone());
+        }
+        measured.advance(self.end);
+        measured
+    }
+
     /// The same network, looked at until then \[s\].
     pub fn until(&self, end_s: f64) -> Network {
-        let end_s = end_s.min(self.end_s);
-        let kept = |changes: &Vec<(f64, bool)>| changes.iter().copied().filter(|(at, _)| *at < end_s).collect();
+        let end = Time::from_secs(end_s).min(self.end);
+        let kept = |changes: &Vec<(Time, bool)>| changes.iter().copied().filter(|(at, _)| *at < end).collect();
         let changes = self.changes.iter().map(|(link, changes)| (link.clone(), kept(changes))).collect();
-        Network { start_s: self.start_s, end_s, changes }
+        Network { end, changes }
     }
 
     /// The measured connectivity with what was heard: how messages filled the times in which links were up.
     pub fn connectivity_heard(&self, exact: &[Record], facts: &Facts) -> Option<Connectivity> {
         let mut connectivity = self.connectivity(facts)?;
+        let end_s = self.end.secs();
         let mut messages: BTreeMap<(&str, &str), Vec<(f64, f64)>> = BTreeMap::new();
         let handed_over = |row: &&MessageRow| matches!(row.fate, Fate::Delivered | Fate::Copied);
         let rows = exact.iter().filter_map(|record| match record {
             Record::Message(row) => Some(row),
             _ => None,
         });
-        for row in rows.filter(handed_over).filter(|row| row.due_ns as f64 / 1e9 < self.end_s) {
+        for row in rows.filter(handed_over).filter(|row| row.due_ns < self.end.nanos()) {
             let times = (row.sent_ns as f64 / 1e9, row.due_ns as f64 / 1e9);
             messages.entry((&row.from, &row.to)).or_default().push(times);
         }
         let validity = facts.validity_s.unwrap_or(f64::INFINITY);
         for (from, to) in &facts.links {
             let down = self.down_times(from, to);
-            let up = complement(&down, self.start_s, self.end_s);
-            let ended = up.iter().filter(|(_, until)| *until < self.end_s).map(|(from, until)| until - from);
+            let up = complement(&down, 0.0, end_s);
+            let ended = up.iter().filter(|(_, until)| *until < end_s).map(|(from, until)| until - from);
             connectivity.shortest_up_s = ended.fold(connectivity.shortest_up_s, f64::min);
             let mut own = messages.remove(&(from.as_str(), to.as_str())).unwrap_or_default();
             own.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
-            let heard = Heard::of(&own, validity, self.end_s);
+            let heard = Heard::of(&own, validity, end_s);
             let lasts = |times: &[(f64, f64)]| times.iter().map(|(from, to)| to - from).sum::<f64>();
             let up_s = lasts(&up);
             if up_s > 0.0 {
@@ -361,54 +213,6 @@ impl Network {
         }
         Some(connectivity)
     }
-
-    /// The run cut at every change of a link, with the edges that are up in each piece.
-    fn pieces(&self, facts: &Facts) -> Vec<Piece> {
-        let index = |id: &str| facts.vehicles.iter().position(|vehicle| vehicle.id == id);
-        let mut edges = BTreeSet::new();
-        let mut events: Vec<(f64, usize, usize, bool)> = Vec::new();
-        for ((from, to), changes) in &self.changes {
-            let (Some(from), Some(to)) = (index(from), index(to)) else { continue };
-            if changes.first().is_none_or(|first| !first.1) {
-                edges.insert((from, to));
-            }
-            events.extend(changes.iter().map(|(at, up)| (*at, from, to, *up)));
-        }
-        events.sort_by(|a, b| a.0.total_cmp(&b.0));
-        events.push((self.end_s, 0, 0, false));
-        let (mut pieces, mut since) = (Vec::new(), self.start_s);
-        for (at, from, to, up) in events {
-            if at > since {
-                pieces.push(Piece { length_s: at - since, edges: edges.clone() });
-                since = at;
-            }
-            if up {
-                edges.insert((from, to))
-            } else {
-                edges.remove(&(from, to))
-            };
-        }
-        pieces
-    }
-}
-
-/// A time in which no link changes.
-struct Piece {
-    length_s: f64,
-    edges: BTreeSet<(usize, usize)>,
-}
-
-/// The shortest time between two changes; `None` before the second.
-fn dwell(pieces: &[Piece]) -> Option<f64> {
-    let mut lengths: Vec<(f64, &BTreeSet<(usize, usize)>)> = Vec::new();
-    for piece in pieces {
-        match lengths.last_mut() {
-            Some((length, edges)) if **edges == piece.edges => *length += piece.length_s,
-            _ => lengths.push((piece.length_s, &piece.edges)),
-        }
-    }
-    let inner = lengths.len().checked_sub(2).map_or(&[][..], |inner| &lengths[1..=inner]);
-    inner.iter().map(|(length, _)| *length).min_by(f64::total_cmp)
 }
 
 /// What intervals leave of a time.
@@ -419,51 +223,7 @@ fn complement(intervals: &[(f64, f64)], start: f64, end: f64) -> Vec<(f64, f64)>
     left.filter(|(from, to)| to > from).collect()
 }
 
-/// The longest wait, over all instants, until the links seen since then connect the fleet. It is longest just after
-/// a change, and waits that the end of the run cuts short are counted only as far as they went.
-fn union_period(count: usize, pieces: &[Piece], connected: &[bool]) -> Option<f64> {
-    let mut longest = 0.0_f64;
-    let mut complete = false;
-    for start in 0..pieces.len() {
-        if connected[start] {
-            complete = true;
-            continue;
-        }
-        let mut union = BTreeSet::new();
-        let mut waited = 0.0;
-        let end = pieces[start..].iter().find(|piece| {
-            union.extend(piece.edges.iter().copied());
-            let done = has_root(count, &union);
-            waited += if done { 0.0 } else { piece.length_s };
-            done
-        });
-        complete |= end.is_some();
-        longest = longest.max(waited);
-        if end.is_none() {
-            break;
-        }
-    }
-    complete.then_some(longest)
-}
-
-/// Whether some vehicle's messages can reach all others (a globally reachable vertex of the graph of who hears whom).
-fn has_root(count: usize, edges: &BTreeSet<(usize, usize)>) -> bool {
-    (0..count).any(|root| {
-        let mut reached = vec![false; count];
-        let mut open = vec![root];
-        reached[root] = true;
-        while let Some(vertex) = open.pop() {
-            for (_, to) in edges.range((vertex, 0)..=(vertex, usize::MAX)) {
-                if !reached[*to] {
-                    reached[*to] = true;
-                    open.push(*to);
-                }
-            }
-        }
-        reached.into_iter().all(|reached| reached)
-    })
-}
-
+/// What two lists of intervals have in common.
 fn intersection(a: &[(f64, f64)], b: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let (mut i, mut j, mut common) = (0, 0, Vec::new());
     while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
@@ -477,12 +237,12 @@ fn intersection(a: &[(f64, f64)], b: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::results::VehicleFacts;
     use common::record::TopologyRow;
 
-    fn facts(links: &[(&str, &str)]) -> Facts {
+    pub(in crate::results) fn facts(links: &[(&str, &str)]) -> Facts {
         let vehicle = |id: &str| VehicleFacts { id: id.into(), ..VehicleFacts::default() };
         Facts {
             vehicles: ["1", "2", "3"].map(vehicle).to_vec(),
@@ -493,103 +253,13 @@ mod tests {
         }
     }
 
-    fn change(t_s: i64, from: &str, to: &str, up: bool) -> Record {
+    pub(in crate::results) fn change(t_s: i64, from: &str, to: &str, up: bool) -> Record {
         Record::Topology(TopologyRow { t_ns: t_s * 1_000_000_000, from: from.into(), to: to.into(), up })
     }
 
-    fn message(seq: u64, sent_ns: i64, fate: Fate) -> Record {
+    pub(in crate::results) fn message(seq: u64, sent_ns: i64, fate: Fate) -> Record {
         let (from, to) = ("1".into(), "2".into());
         Record::Message(MessageRow { t_ns: sent_ns + 5, from, to, seq, sent_ns, due_ns: sent_ns + 5_000_000_000, fate })
-    }
-
-    fn link_1_2(rows: &[Record]) -> LinkSummary {
-        let facts = facts(&[("1", "2")]);
-        links(rows, &facts, &Network::of(rows, &facts)).remove(0)
-    }
-
-    #[test]
-    fn every_message_has_one_fate() {
-        let fates = [Fate::Delivered, Fate::Lost, Fate::LinkDown, Fate::QueueFull, Fate::InFlight, Fate::Delivered];
-        let rows: Vec<Record> = (0..).zip(fates).map(|(seq, fate)| message(seq, seq as i64, fate)).collect();
-        let link = link_1_2(&rows);
-        assert!(link.balanced);
-        assert_eq!((link.sent, link.delivered, link.delivered_bytes), (6, 2, 20));
-        assert_eq!(link.delay, Some(Spread { median: 5.0, p99: 5.0, max: 5.0 }));
-        assert_eq!(transmissions(&rows).values().sum::<u64>(), 6);
-    }
-
-    #[test]
-    fn each_cause_is_counted_and_copies_were_sent_by_nobody() {
-        let mut rows: Vec<Record> =
-            Fate::DROPS.into_iter().zip(0..).map(|(fate, seq)| message(seq, seq as i64, fate)).collect();
-        for fate in [Fate::Copied, Fate::CopyDropped, Fate::CopyInFlight] {
-            rows.push(message(3, 3, fate));
-        }
-        let link = link_1_2(&rows);
-        let causes = [
-            link.lost,
-            link.out_of_range,
-            link.link_down,
-            link.queue_full,
-            link.half_duplex,
-            link.collision,
-            link.corrupt,
-            link.receiver_absent,
-        ];
-        assert_eq!(causes, [1; 8]);
-        assert_eq!((link.copied, link.copy_dropped, link.copy_in_flight), (1, 1, 1));
-        assert_eq!((link.sent, link.delivered, link.repeated, link.balanced), (8, 0, 0, true));
-    }
-
-    #[test]
-    fn what_never_left_its_sender_was_not_on_the_air() {
-        let row = |seq: u64, to: &str, fate, waits: i64| {
-            let (t_ns, sent_ns) = (seq as i64 + 5, seq as i64);
-            let (from, to) = ("1".into(), to.into());
-            Record::Message(MessageRow { t_ns, from, to, seq, sent_ns, due_ns: t_ns + waits, fate })
-        };
-        let rows = [
-            row(0, "2", Fate::Delivered, 0),
-            // No place at the sender, on either link; then one that was sent and found no place on one link.
-            row(1, "2", Fate::QueueFull, 0),
-            row(1, "3", Fate::QueueFull, 0),
-            row(2, "2", Fate::QueueFull, 9),
-            row(2, "3", Fate::Lost, 9),
-            // Under way, and still waiting, at the end.
-            row(3, "2", Fate::InFlight, 9),
-            row(4, "2", Fate::InFlight, 0),
-        ];
-        assert_eq!(transmissions(&rows).get("1"), Some(&3));
-    }
-
-    #[test]
-    fn a_message_without_a_fate_or_with_two_unbalances_the_ledger() {
-        let gap = link_1_2(&[message(0, 0, Fate::Delivered), message(2, 2, Fate::Delivered)]);
-        assert_eq!((gap.missing, gap.balanced), (1, false));
-        let twice = link_1_2(&[message(0, 0, Fate::Delivered), message(0, 0, Fate::Lost)]);
-        assert_eq!((twice.repeated, twice.sent, twice.balanced), (1, 1, false));
-        let second_life = link_1_2(&[message(7, 0, Fate::Delivered), message(0, 5, Fate::Delivered)]);
-        assert!(second_life.balanced);
-    }
-
-    #[test]
-    fn links_that_only_the_recording_knows_are_listed_too() {
-        let facts = facts(&[("2", "1")]);
-        let rows = [message(0, 0, Fate::Delivered)];
-        let links = links(&rows, &facts, &Network::of(&rows, &facts));
-        let names: Vec<_> = links.iter().map(|link| (link.from.as_str(), link.sent)).collect();
-        assert_eq!(names, [("2", 0), ("1", 1)]);
-    }
-
-    #[test]
-    fn up_times_are_measured() {
-        let rows = [change(0, "1", "2", false), change(25, "1", "2", true), change(90, "1", "2", false)];
-        let link = link_1_2(&rows);
-        assert!((link.up_fraction - 0.65).abs() < 1e-12);
-        assert_eq!(link.longest_outage_s, 25.0);
-        // The first thing said of a link is that it comes up: it was down before.
-        assert_eq!(link_1_2(&[change(40, "1", "2", true)]).longest_outage_s, 40.0);
-        assert_eq!(link_1_2(&[]).up_fraction, 1.0);
     }
 
     /// Example 4.1: both links fail during 7.5 s of every 10 s.
@@ -631,9 +301,12 @@ mod tests {
 
     #[test]
     fn one_direction_is_enough_for_a_leader() {
-        let connected = |edges: &[(usize, usize)]| has_root(3, &edges.iter().copied().collect());
-        assert!(connected(&[(0, 1), (1, 2)]));
-        assert!(!connected(&[(0, 1), (2, 1)]));
+        let alpha = |links: &[(&str, &str)]| {
+            let facts = facts(links);
+            Network::of(&[], &facts).connectivity(&facts).expect("three vehicles").alpha
+        };
+        assert_eq!(alpha(&[("1", "2"), ("2", "3")]), 0.0);
+        assert_eq!(alpha(&[("1", "2"), ("3", "2")]), 1.0, "nobody hears both ends");
     }
 
     #[test]

@@ -62,8 +62,7 @@ fn duration(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::network::Spread;
-    use super::super::{DeadlineSummary, DeliverySummary, OverrunSummary};
+    use super::super::{DeadlineSummary, DeliverySummary, OverrunSummary, Spread};
     use super::*;
     use common::record::Overrun;
 

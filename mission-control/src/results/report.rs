@@ -5,10 +5,13 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::decay::fitted_where;
-use super::drawing::{GRID, INK, PAPER};
 use super::graph::printed;
-use super::summary::PATH_THRESHOLD_M;
-use super::{ClockSummary, Facts, Figure, GraphFacts, LinkSummary, Summary, VehicleSummary};
+use super::html::{STYLE, escape, inline, number, optional, percent, table, told};
+use super::verdict::verdict;
+use super::{
+    ClockSummary, DeadlineSummary, Facts, Figure, FleetSummary, GraphFacts, LinkSummary, MessageCounts, OverrunSummary,
+    Summary, VehicleSummary,
+};
 
 /// A line of the table "theory beside measurement".
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -107,74 +110,6 @@ fn header(page: &mut String, report: &Report<'_>) {
         let _ = write!(page, "<div><dt>{name}</dt><dd>{value}</dd></div>");
     }
     page.push_str("</dl>\n</header>\n");
-}
-
-/// How closely a steady error must agree with its prediction to count as predicted.
-const PREDICTED_PART: f64 = 0.1;
-
-/// Whether all is well, and what happened in a sentence or two.
-fn verdict(report: &Report<'_>) -> (bool, String) {
-    let fleet = &report.summary.fleet;
-    let coordination = &fleet.coordination;
-    let flown = report.summary.vehicles.iter().filter(|vehicle| vehicle.rows > 0).count();
-    if flown == 0 {
-        return (false, "Nothing was recorded.".into());
-    }
-    let mut good = report.summary.complete && fleet.messages.balanced;
-    let mut sentences = Vec::new();
-    if flown > 1 {
-        let settled = coordination.settled_s.or(coordination.settled_absolute_s);
-        let mut range = format!(
-            "the largest coordination error went from {} to {}",
-            number(coordination.initial),
-            number(coordination.last)
-        );
-        if let Some(at) = coordination.early(report.summary.duration_s) {
-            let _ = write!(range, " at {} s, when all were last recorded", number(at));
-        }
-        // An error that was never measured is none that is small.
-        let settled = settled.filter(|_| coordination.last_s.is_some());
-        if coordination.last_s.is_none() {
-            range = "the vehicles were never recorded together".to_owned();
-        }
-        good &= settled.is_some() && coordination.early(report.summary.duration_s).is_none();
-        sentences.push(match settled {
-            Some(at) => format!("<strong>Coordinated after {} s</strong>: {range}.", number(at)),
-            None => format!("<strong>Not coordinated at the end</strong>: {range}."),
-        });
-    }
-    // A steady error that theory predicts is no surprise: the design vector δ of Theorem 4.7 leaves one.
-    let biases = report.facts.vehicles.iter().filter_map(|vehicle| vehicle.predicted_along_bias_m.map(f64::abs));
-    let bias = biases.max_by(f64::total_cmp);
-    let as_predicted = bias.filter(|bias| (fleet.path_error_final_m - bias).abs() <= PREDICTED_PART * bias);
-    good &= fleet.on_path_s.is_some() || as_predicted.is_some();
-    let each = if flown > 1 { "Every vehicle" } else { "The vehicle" };
-    sentences.push(match fleet.on_path_s {
-        Some(at) => {
-            format!("{each} stayed within {} m of its path from {} s on.", number(PATH_THRESHOLD_M), number(at))
-        }
-        None => {
-            let end = number(fleet.path_error_final_m);
-            match as_predicted {
-                Some(bias) => format!(
-                    "The largest path-following error at the end was {end} m, of the {} m that the law leaves by design.",
-                    number(bias)
-                ),
-                None => format!("The largest path-following error at the end was {end} m."),
-            }
-        }
-    });
-    let failed = report.theory.iter().filter(|row| row.holds == Some(false)).count();
-    if failed > 0 {
-        good = false;
-        let (noun, verb) = if failed == 1 { ("condition", "does") } else { ("conditions", "do") };
-        sentences.push(format!("{failed} {noun} of the theory {verb} not hold for this mission."));
-    }
-    if report.theory.iter().any(TheoryRow::is_below) {
-        good = false;
-        sentences.push(format!("The coordination error decayed {BELOW}."));
-    }
-    (good, sentences.join(" "))
 }
 
 fn theory(page: &mut String, rows: &[TheoryRow]) {
@@ -281,6 +216,25 @@ fn vehicles(page: &mut String, report: &Report<'_>) {
     let _ = write!(page, "<p class=\"remark\">{}</p>\n</section>\n", sentences.join(" "));
 }
 
+/// A column of the table of links: its name, what it counts, and whether it is there although nothing was counted.
+type Column = (&'static str, fn(&MessageCounts) -> u64, bool);
+
+/// What can always happen has a column, the rest only where it did.
+const COLUMNS: [Column; 12] = [
+    ("sent", |counts| counts.sent, true),
+    ("delivered", |counts| counts.delivered, true),
+    ("lost", |counts| counts.lost, true),
+    ("out of range", |counts| counts.out_of_range, false),
+    ("link down", |counts| counts.link_down, true),
+    ("queue full", |counts| counts.queue_full, true),
+    ("deaf while speaking", |counts| counts.half_duplex, false),
+    ("collided", |counts| counts.collision, false),
+    ("corrupt", |counts| counts.corrupt, false),
+    ("receiver absent", |counts| counts.receiver_absent, false),
+    ("in flight", |counts| counts.in_flight, true),
+    ("second copies", |counts| counts.copied, false),
+];
+
 /// Most links in the table.
 const MOST_LINKS: usize = 300;
 
@@ -291,25 +245,11 @@ fn network(page: &mut String, report: &Report<'_>) {
     }
     page.push_str("<section>\n<h2>Network</h2>\n");
     let totals = &report.summary.fleet.messages;
-    // What can always happen has a column, the rest only where it did.
-    type Column = (&'static str, fn(&LinkSummary) -> u64, u64, bool);
-    let columns: Vec<Column> = [
-        ("sent", (|link| link.sent) as fn(&LinkSummary) -> u64, totals.sent, true),
-        ("delivered", |link| link.delivered, totals.delivered, true),
-        ("lost", |link| link.lost, totals.lost, true),
-        ("out of range", |link| link.out_of_range, totals.out_of_range, false),
-        ("link down", |link| link.link_down, totals.link_down, true),
-        ("queue full", |link| link.queue_full, totals.queue_full, true),
-        ("deaf while speaking", |link| link.half_duplex, totals.half_duplex, false),
-        ("collided", |link| link.collision, totals.collision, false),
-        ("corrupt", |link| link.corrupt, totals.corrupt, false),
-        ("receiver absent", |link| link.receiver_absent, totals.receiver_absent, false),
-        ("in flight", |link| link.in_flight, totals.in_flight, true),
-        ("second copies", |link| link.copied, totals.copied, false),
-    ]
-    .into_iter()
-    .filter(|(_, _, total, always)| *always || *total > 0)
-    .collect();
+    let columns: Vec<&Column> =
+        COLUMNS.iter().filter(|(_, count, always)| *always || count(&totals.counts) > 0).collect();
+    let counted = |counts: &MessageCounts| -> Vec<String> {
+        columns.iter().map(|(_, count, _)| count(counts).to_string()).collect()
+    };
     let mut header = vec!["link"];
     header.extend(columns.iter().map(|column| column.0));
     header.extend(["delay [s]", "up", "longest outage [s]", "ledger"]);
@@ -317,7 +257,7 @@ fn network(page: &mut String, report: &Report<'_>) {
         let ledger =
             if link.balanced { "<span class=\"yes\">balanced</span>" } else { "<span class=\"no\">open</span>" };
         let mut cells = vec![format!("{}&nbsp;→&nbsp;{}", escape(&link.from), escape(&link.to))];
-        cells.extend(columns.iter().map(|column| column.1(link).to_string()));
+        cells.extend(counted(&link.messages));
         cells.extend([
             optional(link.delay.map(|delay| delay.median), ""),
             percent(link.up_fraction),
@@ -328,37 +268,43 @@ fn network(page: &mut String, report: &Report<'_>) {
     };
     let sum = (links.len() > 1).then(|| {
         let mut cells = vec!["all".to_owned()];
-        cells.extend(columns.iter().map(|column| column.2.to_string()));
+        cells.extend(counted(&totals.counts));
         cells.extend(["", "", "", ""].map(str::to_owned));
         cells
     });
     // A complete graph of two hundred vehicles would be a page of its own.
     let mut shown: Vec<&LinkSummary> = links.iter().collect();
     if shown.len() > MOST_LINKS {
-        shown.sort_by_key(|link| std::cmp::Reverse(link.sent - link.delivered.min(link.sent)));
+        shown.sort_by_key(|link| std::cmp::Reverse(link.messages.sent.saturating_sub(link.messages.delivered)));
         shown.truncate(MOST_LINKS);
     }
     table(page, "numbers", &header, shown.iter().map(|link| row(link)).chain(sum));
-    let mut sentences = Vec::new();
-    if shown.len() < links.len() {
+    let hidden = (shown.len() < links.len()).then(|| {
         let (few, all) = (shown.len(), links.len());
-        sentences.push(format!("The {few} of {all} links that delivered least; all are in <code>summary.json</code>."));
-    }
-    sentences.push(format!(
+        format!("The {few} of {all} links that delivered least; all are in <code>summary.json</code>. ")
+    });
+    let remark = hidden.unwrap_or_default() + &on_the_air(&report.summary.fleet);
+    let _ = write!(page, "<p class=\"remark\">{remark}</p>\n</section>\n");
+}
+
+/// What was transmitted, and what it left of the fleet's connectivity.
+fn on_the_air(fleet: &FleetSummary) -> String {
+    let totals = &fleet.messages;
+    let mut text = format!(
         "{} transmissions of at most {} bytes: {} bytes on the air.",
         totals.transmissions, totals.message_bytes, totals.bytes_on_air
-    ));
-    if let Some(connectivity) = report.summary.fleet.connectivity {
-        let mut sentence = format!("Measured loss of connectivity: α = {}", number(connectivity.alpha));
+    );
+    if let Some(connectivity) = fleet.connectivity {
+        let _ = write!(text, " Measured loss of connectivity: α = {}", number(connectivity.alpha));
         if let Some(t_0_s) = connectivity.t_0_s {
-            let _ = write!(sentence, ", T<sub>0</sub> = {} s", number(t_0_s));
+            let _ = write!(text, ", T<sub>0</sub> = {} s", number(t_0_s));
         }
         if let Some(t_s) = connectivity.t_s {
-            let _ = write!(sentence, "; connected in the union over every {} s", number(t_s));
+            let _ = write!(text, "; connected in the union over every {} s", number(t_s));
         }
-        sentences.push(format!("{sentence}."));
+        text.push('.');
     }
-    let _ = write!(page, "<p class=\"remark\">{}</p>\n</section>\n", sentences.join(" "));
+    text
 }
 
 fn clock(page: &mut String, clock: &ClockSummary) {
@@ -367,7 +313,7 @@ fn clock(page: &mut String, clock: &ClockSummary) {
     let class = if verdict.kept_time { "good" } else { "attention" };
     let _ = writeln!(page, "<p class=\"verdict {class}\">{}</p>", escape(&verdict.text));
     if !clock.deadlines.is_empty() {
-        let row = |deadlines: &super::DeadlineSummary| {
+        let row = |deadlines: &DeadlineSummary| {
             let missed = match deadlines.missed {
                 0 => "0".to_owned(),
                 missed => format!("<span class=\"no\">{missed}</span>"),
@@ -389,7 +335,7 @@ fn clock(page: &mut String, clock: &ClockSummary) {
         );
     }
     if !clock.overruns.is_empty() {
-        let row = |overrun: &super::OverrunSummary| {
+        let row = |overrun: &OverrunSummary| {
             vec![escape(&overrun.vehicle), overrun.place.as_str().to_owned(), overrun.count.to_string()]
         };
         let header = ["vehicle", "where the oldest messages were dropped for want of time", "messages"];
@@ -426,106 +372,11 @@ fn reproduce(page: &mut String, report: &Report<'_>) {
     );
 }
 
-/// A table that scrolls sideways on a narrow screen. Cells are HTML already.
-pub(crate) fn table(page: &mut String, class: &str, header: &[&str], rows: impl Iterator<Item = Vec<String>>) {
-    let _ = write!(page, "<div class=\"scroll\"><table class=\"{class}\">\n<thead><tr>");
-    for cell in header {
-        let _ = write!(page, "<th>{}</th>", escape(cell));
-    }
-    page.push_str("</tr></thead>\n<tbody>\n");
-    for row in rows {
-        page.push_str("<tr>");
-        for cell in row {
-            let _ = write!(page, "<td>{cell}</td>");
-        }
-        page.push_str("</tr>\n");
-    }
-    page.push_str("</tbody></table></div>\n");
-}
-
-/// The figure as part of the page: as wide as there is room, in the colours of the page.
-fn inline(svg: &str) -> String {
-    let attribute = |name: &str| -> Option<f64> {
-        let start = svg.find(&format!(" {name}=\""))? + name.len() + 3;
-        svg[start..].split('"').next()?.parse().ok()
-    };
-    let body = svg.find('>').map_or("", |end| &svg[end..]);
-    let (width, height) = (attribute("width").unwrap_or(1000.0), attribute("height").unwrap_or(700.0));
-    let body = body.replace(PAPER, "var(--paper)").replace(INK, "var(--ink)").replace(GRID, "var(--grid)");
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
-         font-family=\"Helvetica, Arial, DejaVu Sans, sans-serif\" fill=\"var(--ink)\"{body}"
-    )
-}
-
-/// Text that means itself in HTML.
-pub(crate) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            other => escaped.push(other),
-        }
-    }
-    escaped
-}
-
-/// What is fit to be told to a person: a text with a number in it that is none says nothing, and none has a hundred digits.
-pub(crate) fn told(text: &str) -> String {
-    let is_none = |word: &str| ["NaN", "nan", "inf"].contains(&word);
-    if text.split(|c: char| !c.is_alphanumeric()).any(is_none) {
-        return "–".into();
-    }
-    let short = |word: &str| match word.parse::<f64>() {
-        Ok(value) if word.len() > MOST_DIGITS => format!("{value:.3e}"),
-        _ => word.to_owned(),
-    };
-    text.split(' ').map(short).collect::<Vec<_>>().join(" ")
-}
-
-/// A number with more characters than this is better written with a power of ten.
-const MOST_DIGITS: usize = 24;
-
 /// The path-following error at the end, with the instant if the vehicle did not last.
 fn at_end(vehicle: &VehicleSummary, duration_s: f64) -> String {
     let error = number(vehicle.path_error_final_m);
     vehicle.early(duration_s).map_or(error.clone(), |at| format!("{error} (at {} s)", number(at)))
 }
-
-fn optional(value: Option<f64>, unit: &str) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{}{unit}", number(value)))
-}
-
-fn percent(part: f64) -> String {
-    format!("{}&nbsp;%", number((part * 1000.0).round() / 10.0))
-}
-
-/// A number with three or four significant digits, as HTML.
-pub(crate) fn number(value: f64) -> String {
-    if !value.is_finite() {
-        return "–".into();
-    }
-    let magnitude = value.abs();
-    let minus = if value < 0.0 { "−" } else { "" };
-    if magnitude == 0.0 {
-        return "0".into();
-    }
-    if !(1e-3..1e6).contains(&magnitude) {
-        let text = format!("{magnitude:.1e}");
-        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-        return format!("{minus}{mantissa}·10<sup>{}</sup>", exponent.replace('-', "−"));
-    }
-    let decimals = (3.0 - magnitude.log10().floor()).clamp(0.0, 6.0) as usize;
-    let text = format!("{magnitude:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    format!("{minus}{text}")
-}
-
-pub(crate) const STYLE: &str = include_str!("report.css");
 
 #[cfg(test)]
 mod tests {
@@ -588,14 +439,11 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_not_printed() {
-        assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(number), ["–"; 3]);
         let row = TheoryRow { predicted: "-NaN m".into(), measured: "inf".into(), ..TheoryRow::default() };
         let page = page(false, &[row]);
         for text in ["NaN", ">inf<"] {
             assert!(!page.contains(text), "{text}");
         }
-        assert_eq!(told("information from infinity"), "information from infinity");
-        assert_eq!(told(&format!("{:.5} 1/s, 0.25 m", -1.5e137)), "-1.500e137 1/s, 0.25 m");
     }
 
     #[test]
@@ -619,12 +467,5 @@ mod tests {
         assert!(page.contains(&format!("at {} s, when all were last recorded", number(at))), "{at}");
         assert!(page.contains("verdict attention"));
         assert!(page.contains("v2 recorded nothing after "));
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        let written = [0.0, 0.5, -12.345_67, 0.001_234_56, 3.1e-4, 123_456.7, 2.5e7, 100.0].map(number);
-        let expected = ["0", "0.5", "−12.35", "0.001235", "3.1·10<sup>−4</sup>", "123457", "2.5·10<sup>7</sup>", "100"];
-        assert_eq!(written, expected);
     }
 }

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
+use common::coordination::disagreement;
 use common::mission::Pattern;
 use common::record::{Record, SpeedRow, StateRow};
 use common::time::Time;
 
-use super::statistics::mean;
+use super::statistics::steady_from;
 use super::{Facts, Way};
 
 /// The rows of one vehicle in order of time.
@@ -95,7 +96,7 @@ impl Coordination {
                 let driven: Vec<f64> = driven
                     .map(|((track, cursor), way)| driven_by_following(track, *cursor, way, facts.control_period_s))
                     .collect();
-                d.push(from_mean(&driven));
+                d.push(disagreement::of_fleet(driven.iter().copied()));
             }
         }
         coordination.disturbance = ways.iter().any(|way| way.0.is_some()).then_some(d);
@@ -113,7 +114,7 @@ impl Coordination {
 
     /// ‖(I − 11ᵀ/n) x‖, the norm of what the states differ from their mean by, over time.
     pub fn norm(&self) -> Vec<f64> {
-        self.over_time(from_mean)
+        self.over_time(|states| disagreement::of_fleet(states.iter().copied()))
     }
 
     fn over_time(&self, value: impl Fn(&[f64]) -> f64) -> Vec<f64> {
@@ -139,10 +140,16 @@ pub(super) fn unbroken(t_s: &[f64], facts: &Facts) -> Vec<Range<usize>> {
     bounds.windows(2).map(|pair| pair[0]..pair[1]).filter(|part| !part.is_empty()).collect()
 }
 
-/// The norm of what values differ from their mean by.
-fn from_mean(values: &[f64]) -> f64 {
-    let mean = mean(values.iter().copied());
-    values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>().sqrt()
+/// The index at which the steady part begins.
+pub(super) fn steady_part(t_s: &[f64], facts: &Facts) -> usize {
+    let (Some(first), Some(last)) = (t_s.first(), t_s.last()) else { return 0 };
+    let from = steady_from(*last, *first, facts.link_period_s);
+    t_s.partition_point(|time| *time < from - 1e-9)
+}
+
+/// Whether an instant is before the end by more than a row or two.
+pub(super) fn is_early(t_s: f64, duration_s: f64) -> bool {
+    duration_s - t_s > (0.01 * duration_s).max(1.0)
 }
 
 fn way<'a>(facts: &'a Facts, id: &str) -> &'a Way {

@@ -5,6 +5,9 @@ use serde::Serialize;
 /// A fitted rate is good to this part: ripples and sampled laws cost that much.
 pub const FIT_PART: f64 = 0.02;
 
+/// Settling, without an absolute threshold, means to stay below this part of the largest value.
+pub(super) const SETTLED_PART: f64 = 0.02;
+
 /// An exponential decay fitted to the norm of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ExponentialFit {
@@ -128,6 +131,14 @@ fn from_then_on(values: &[f64]) -> Vec<f64> {
         largest[index - 1] = largest[index - 1].max(largest[index]);
     }
     largest
+}
+
+/// Indices of about `samples` evenly spaced entries of `count`, first and last included.
+pub(super) fn thinned(count: usize, samples: usize) -> Vec<usize> {
+    if count <= samples {
+        return (0..count).collect();
+    }
+    (0..samples).map(|step| step * (count - 1) / (samples - 1)).collect()
 }
 
 /// Where the last fifth of a series begins, rounded to whole periods of the network if it has some.

@@ -51,8 +51,8 @@ pub const MEASURES: [Measure; 14] = [
         of: |s| Some(s.fleet.path_error_final_m),
     },
     Measure { name: "on_path_s", about: "time until all are on their paths [s]", of: |s| s.fleet.on_path_s },
-    Measure { name: "sent", about: "messages on all links", of: |s| Some(s.fleet.messages.sent as f64) },
-    Measure { name: "delivered", about: "messages delivered", of: |s| Some(s.fleet.messages.delivered as f64) },
+    Measure { name: "sent", about: "messages on all links", of: |s| Some(s.fleet.messages.counts.sent as f64) },
+    Measure { name: "delivered", about: "messages delivered", of: |s| Some(s.fleet.messages.counts.delivered as f64) },
     Measure { name: "transmissions", about: "transmissions", of: |s| Some(s.fleet.messages.transmissions as f64) },
     Measure { name: "bytes_on_air", about: "bytes on the air", of: |s| Some(s.fleet.messages.bytes_on_air as f64) },
     Measure {

@@ -1,5 +1,6 @@
 //! The theorem monitor over a fleet under way: the switching signal up to now, and where the vehicles said they are.
 
+use common::coordination::disagreement;
 use common::mission::Mission;
 use common::theory::monitor::{self, Envelope, Margin, Premise, Seen};
 use common::time::{Span, Time};
@@ -64,7 +65,8 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
     let network = Network::of(&flown);
     let planned = Seen::of(&network.planned)?;
     let missing = missing(mission, status);
-    let (initial_error, error) = (norm(&at_start(mission)), now(mission, status).map(|now| norm(&now)));
+    let norm = |states: Vec<f64>| disagreement::of_fleet(states.into_iter());
+    let (initial_error, error) = (norm(at_start(mission)), now(mission, status).map(norm));
     let Some(looked) = looked_for(&flown, &network) else {
         let names = "Theorems 4.4 and 4.5 and Lemma 4.7 do not speak of this law; the report says what does";
         let verdict = missing.as_ref().map_or(names.to_string(), |premise| format!("not covered: {premise}"));
@@ -174,11 +176,6 @@ fn now(mission: &Mission, status: &FleetStatus) -> Option<Vec<f64>> {
         Some(xi + speed * (status.now - made).secs() - plan.pattern.at(status.now).h)
     };
     mission.vehicles.iter().map(of).collect()
-}
-
-fn norm(states: &[f64]) -> f64 {
-    let mean = states.iter().sum::<f64>() / states.len().max(1) as f64;
-    states.iter().map(|x| (x - mean).powi(2)).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]

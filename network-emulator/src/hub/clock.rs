@@ -1,11 +1,12 @@
 //! The flight itself: its clock, its channel, and the conducting of stepped runs.
 
 use common::machine::Machine;
+use common::mission::SharedMission;
 use common::record::{Record, Row, SpeedRow};
 use common::time::Time;
 use common::wire::vehicle::{ClockPlan, Phase, SpeedCommand, ToVehicle};
 
-use super::{Hub, HubOutput, LATEST_BEGIN_S, Opened};
+use super::{Hub, HubOutput, LATEST_BEGIN_S};
 use crate::emulator::{Channel, Emulator, Sent};
 use crate::lockstep::Lockstep;
 
@@ -31,7 +32,7 @@ impl Hub {
         });
         let absent: Vec<usize> = if real { absent.collect() } else { Vec::new() };
         load.lockstep = (!real).then(|| Lockstep::new(&load.mission, self.window));
-        let (mission, fresh) = (Opened(load.mission.clone()), !load.adopted);
+        let (mission, fresh) = (SharedMission(load.mission.clone()), !load.adopted);
         self.outputs.push_back(HubOutput::OpenLog { mission, fresh });
         if load.adopted {
             load.emulator.skip_to(now);

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use common::machine::Machine;
-use common::mission::Mission;
+use common::mission::{Mission, SharedMission};
 use common::record::{Row, Settled};
 use common::time::Time;
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
@@ -97,7 +97,7 @@ pub enum HubOutput {
     /// Open a log for this mission and answer with [`HubInput::LogOpened`].
     OpenLog {
         /// The mission.
-        mission: Opened,
+        mission: SharedMission,
         /// Whether the flight begins: what an earlier flight of the same mission left is set aside.
         fresh: bool,
     },
@@ -124,16 +124,6 @@ pub enum HubOutput {
     },
     /// A line for people.
     Say(String),
-}
-
-/// A mission whose log is to be opened.
-#[derive(Clone, Debug)]
-pub struct Opened(pub Arc<Mission>);
-
-impl PartialEq for Opened {
-    fn eq(&self, other: &Self) -> bool {
-        self.0.digest == other.0.digest
-    }
 }
 
 /// The emulator program as a pure machine.

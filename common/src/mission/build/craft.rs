@@ -12,7 +12,8 @@ use crate::coordination::DemandKind;
 use crate::craft::auv::AuvCraft;
 use crate::craft::kinematic::KinematicCraft;
 use crate::craft::marine::{MarineCraft, SideSlip};
-use crate::craft::robot::{RobotCraft, RobotLaw, SpeedLoop};
+use crate::craft::robot::{RobotCraft, RobotLaw};
+use crate::craft::speed_loop::SpeedLoop;
 use crate::craft::trimming::TrimmingCraft;
 use crate::craft::{Craft, Limits};
 use crate::following::decoupling_2_14::Decoupling;
@@ -63,7 +64,7 @@ pub(in crate::mission) fn craft(
                 amplitude: gains.slip_amplitude_deg.to_radians(),
                 period: gains.slip_period_s,
             };
-            let speed_loop = speed_loop(demand, gains.k_speed);
+            let speed_loop = SpeedLoop::of(demand, gains.k_speed);
             let parameters = marine_parameters(body);
             let craft = MarineCraft::new(plan.path.clone(), law, speed_loop, side_slip, parameters, state, start.xi)?;
             Ok(Box::new(craft.limited(plan.limits)))
@@ -78,10 +79,7 @@ pub(in crate::mission) fn craft(
             let [x, y, _] = start.position;
             let state = State { x, y, heading: start.yaw, speed: start.speed, turn_rate: 0.0 };
             let (law, k_0) = trimming_law(&plan.following, plan.path.at(start.xi).curvature())?;
-            let speed_loop = match demand {
-                DemandKind::Acceleration => SpeedLoop::Acceleration,
-                DemandKind::Rate => SpeedLoop::Rate { k_0 },
-            };
+            let speed_loop = SpeedLoop::of(demand, k_0);
             let craft = TrimmingCraft::new(plan.path.clone(), law, speed_loop, parameters, state, start.xi)?;
             Ok(Box::new(craft.limited(plan.limits)))
         }
@@ -132,13 +130,6 @@ fn trimming_law(choice: &FollowingChoice, c_c: f64) -> Result<(Box<dyn TrimmingL
     })
 }
 
-fn speed_loop(demand: DemandKind, k_0: f64) -> SpeedLoop {
-    match demand {
-        DemandKind::Acceleration => SpeedLoop::Acceleration,
-        DemandKind::Rate => SpeedLoop::Rate { k_0 },
-    }
-}
-
 fn robot(
     plan: &VehiclePlan,
     start: Start,
@@ -150,7 +141,7 @@ fn robot(
     let parameters = Parameters { mass: body.mass_kg, inertia: body.inertia_kgm2 }.checked()?;
     let [x, y, _] = start.position;
     let state = State { x, y, heading: start.yaw, speed: start.speed, turn_rate: 0.0 };
-    let craft = RobotCraft::new(plan.path.clone(), law, speed_loop(demand, k_speed), parameters, state, start.xi)?;
+    let craft = RobotCraft::new(plan.path.clone(), law, SpeedLoop::of(demand, k_speed), parameters, state, start.xi)?;
     Ok(Box::new(craft.limited(plan.limits)))
 }
 

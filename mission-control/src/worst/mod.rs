@@ -1,18 +1,21 @@
 //! `worst`: which of the switching signals that brief connectivity losses admit hurts a mission most?
 
+mod search;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use common::coordination::disagreement;
 use common::graph::adversary::{Allowance, Signal, Signals};
 use common::mission::Mission;
 use common::mission::file::{IntervalSwitching, MissionFile, SwitchingChoice, UpInterval};
-use common::random::Stream;
 use common::record::{Record, Row};
 use common::theory::monitor::Envelope;
 use common::time::{Span, Time};
 use serde::Serialize;
 
+use self::search::search;
 use crate::simulate::simulate;
 use crate::theory;
 
@@ -27,6 +30,14 @@ pub enum Hurt {
 }
 
 impl Hurt {
+    /// What an envelope allows of an error of one, after this time \[s\] or on average over it.
+    fn allowed(self, envelope: &Envelope, length_s: f64) -> f64 {
+        match self {
+            Hurt::End => envelope.at(length_s),
+            Hurt::Mean => envelope.mean(length_s),
+        }
+    }
+
     /// As on the command line.
     fn as_str(self) -> &'static str {
         match self {
@@ -103,7 +114,7 @@ impl Rewriter {
     }
 }
 
-/// Coordination error of a flight, as a norm.
+/// Coordination error of a flight, as a norm \[units of ξ\].
 #[derive(Clone, Copy, Debug)]
 struct Errors {
     initial: f64,
@@ -122,9 +133,8 @@ impl Errors {
 
 fn fly(text: &str) -> Result<Errors, String> {
     let mission = Arc::new(Mission::parse("the mission", text).map_err(|faults| faults.to_string())?);
-    let n = mission.vehicles.len();
     // Rows of one instant come from all vehicles, though not one after the other.
-    let mut rows: Vec<Vec<f64>> = vec![Vec::new(); n];
+    let mut rows: Vec<Vec<f64>> = vec![Vec::new(); mission.vehicles.len()];
     let record = |row| {
         if let Row::Exact(Record::State(state)) = row
             && let Some(index) = mission.index_of(&state.vehicle)
@@ -134,10 +144,7 @@ fn fly(text: &str) -> Result<Errors, String> {
     };
     simulate(&mission, record, |_| true)?;
     let instants = rows.iter().map(Vec::len).min().unwrap_or(0);
-    let norm = |instant: usize| {
-        let mean = rows.iter().map(|xi| xi[instant]).sum::<f64>() / n as f64;
-        rows.iter().map(|xi| (xi[instant] - mean).powi(2)).sum::<f64>().sqrt()
-    };
+    let norm = |instant: usize| disagreement::of_fleet(rows.iter().map(|xi| xi[instant]));
     let norms: Vec<f64> = (0..instants).map(norm).collect();
     let (Some(&initial), Some(&end)) = (norms.first(), norms.last()) else {
         return Err("a flight recorded nothing".to_string());
@@ -165,7 +172,6 @@ pub fn worst(
     let arcs: Vec<(usize, usize)> = mission.links.iter().map(|link| (link.to, link.from)).collect();
     let mut signals = Signals::new(mission.vehicles.len(), &arcs, quest.allowance, mission.end)?;
     let own = signals.given(mission.switching.clone());
-    let starts = starts(&signals, own, quest);
     let Allowance { alpha, t_0, dwell } = quest.allowance;
     let allowed = format!("α = {alpha}, T₀ = {t_0} and a dwell time of {dwell}");
     let space = if file.about.is_empty() { "" } else { " " };
@@ -173,147 +179,50 @@ pub fn worst(
     let rewriter = Rewriter { file, links, more };
     let written = fly(&mission.text)?;
 
-    let chains = CHAINS.min(quest.flights.max(1));
     let flown = AtomicUsize::new(0);
-    let results: Vec<Result<(f64, Signal), String>> = std::thread::scope(|scope| {
-        let chain = |number: usize| {
-            let (signals, starts, rewriter, flown, progress) = (&signals, &starts, &rewriter, &flown, &progress);
-            scope.spawn(move || {
-                let hurts = |signal: &Signal| {
-                    let errors = fly(&rewriter.text(signals, signal)?)?;
-                    progress(flown.fetch_add(1, Ordering::Relaxed) + 1);
-                    Ok(errors.hurt(quest.hurt))
-                };
-                let stream = Stream::new(quest.seed, &format!("worst/{number}"));
-                let more = usize::from(number < quest.flights % chains);
-                let own_starts = starts.iter().skip(number).step_by(chains);
-                climb(signals, own_starts, quest.flights / chains + more, stream, hurts)
-            })
-        };
-        let threads: Vec<_> = (0..chains).map(chain).collect();
-        threads.into_iter().map(|thread| thread.join().map_err(|_| "a search thread ended".to_string())?).collect()
-    });
-    let mut best: Option<(f64, Signal)> = None;
-    for result in results {
-        let found = result?;
-        if best.as_ref().is_none_or(|best| found.0 > best.0) {
-            best = Some(found);
-        }
-    }
-    let (worst, signal) = best.ok_or("no flight was allowed")?;
+    let hurts = |signal: &Signal| {
+        let errors = fly(&rewriter.text(&signals, signal)?)?;
+        progress(flown.fetch_add(1, Ordering::Relaxed) + 1);
+        Ok(errors.hurt(quest.hurt))
+    };
+    let (worst, signal) = search(&signals, own, quest, hurts)?;
+    let flights = flown.into_inner();
     let text = rewriter.text(&signals, &signal)?;
     let Errors { initial, end, .. } = fly(&text)?;
-    let flights = flown.into_inner();
+    let hurt = quest.hurt.as_str();
     let head = format!(
-        "# The worst switching signal found with {allowed}:\n# coordination error ({}) {worst:.4e}, at the start {initial:.4e}, \
-         in {flights} flights.\n# mission-control worst {source} --alpha {alpha} --t0 {} --dwell {} --hurt {} --flights {} --seed {}\n",
-        quest.hurt.as_str(),
+        "# The worst switching signal found with {allowed}:\n# coordination error ({hurt}) {worst:.4e}, at the start {initial:.4e}, \
+         in {flights} flights.\n# mission-control worst {source} --alpha {alpha} --t0 {} --dwell {} --hurt {hurt} --flights {} --seed {}\n",
         t_0.secs(),
         dwell.secs(),
-        quest.hurt.as_str(),
         quest.flights,
         quest.seed
     );
     std::fs::write(out, head + &text).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+
     let length = mission.end - Time::ZERO;
+    let allowed = |envelope: &Envelope| initial * quest.hurt.allowed(envelope, length.secs());
     let promise = theory::envelope_over(mission, signals.graphs(), (alpha, t_0, dwell), length);
-    let bound = promise.as_ref().ok().map(|(envelope, _)| initial * most(envelope, quest.hurt, length.secs()));
     let within = promise.as_ref().ok().map(|(envelope, tolerance)| {
         let slower = Envelope { rate: envelope.rate * (1.0 - tolerance.slower), ..*envelope };
         let late = (slower.rate * tolerance.late).exp();
-        worst <= initial * late * most(&slower, quest.hurt, length.secs()) + tolerance.added
+        worst <= late * allowed(&slower) + tolerance.added
     });
+    let envelope = promise.as_ref().ok().map(|(envelope, _)| envelope);
     Ok(Worst {
         initial,
         hurt: quest.hurt,
         as_written: written.hurt(quest.hurt),
         worst,
         rate: (initial / end).ln() / mission.end.secs(),
-        bound,
+        bound: envelope.map(allowed),
         within,
-        statement: promise.as_ref().ok().map(|(envelope, _)| envelope.statement),
-        guaranteed_rate: promise.as_ref().ok().map(|(envelope, _)| envelope.rate),
+        statement: envelope.map(|envelope| envelope.statement),
+        guaranteed_rate: envelope.map(|envelope| envelope.rate),
         no_bound: promise.err(),
         flights,
         saved: out.to_path_buf(),
     })
-}
-
-/// Searches that go on side by side: a fixed number, so that what is found does not depend on the machine.
-const CHAINS: usize = 4;
-
-/// Signals to begin with, no more than half of the flights (but one): the mission's own if it is admitted, then periodic
-/// extremes and random ones by turns.
-fn starts(signals: &Signals, own: Option<Signal>, quest: &Quest) -> Vec<Signal> {
-    let mut periodic = signals.periodic_starts();
-    let random = (0..).flat_map(|number| {
-        let random = signals.random_start(number, quest.seed);
-        periodic.next().into_iter().chain([random])
-    });
-    let admitted = random.filter(|signal| signals.admits(signal));
-    own.into_iter().chain(admitted).take((quest.flights / 2).max(CHAINS)).collect()
-}
-
-/// Flies the starts, then climbs from the worst of them: takes every change that hurts no less. With each dwell time it
-/// spends half of the flights that are left, and begins with the worst so far that keeps it.
-///
-/// What it returns hurts no less than anything it has flown.
-fn climb<'a>(
-    signals: &Signals,
-    starts: impl Iterator<Item = &'a Signal>,
-    flights: usize,
-    mut stream: Stream,
-    hurts: impl Fn(&Signal) -> Result<f64, String>,
-) -> Result<(f64, Signal), String> {
-    let mut left = flights.max(1);
-    let mut flown: Vec<(f64, Signal)> = Vec::new();
-    for start in starts.take(left) {
-        left -= 1;
-        flown.push((hurts(start)?, start.clone()));
-    }
-    let dwells = signals.allowance().dwells();
-    for (stage, &dwell) in dwells.iter().enumerate() {
-        let signals = signals.with_dwell(dwell);
-        let mut spend = if stage + 1 < dwells.len() { left / 2 } else { left };
-        let Some(mut best) = most_hurting(flown.iter().filter(|(_, signal)| signals.admits(signal))).cloned() else {
-            continue;
-        };
-        // A change that changes nothing is no flight; where almost nothing can change, the search ends early.
-        let mut idle = 0;
-        while spend > 0 && idle < MOST_IDLE {
-            let other = signals.changed(&best.1, &mut stream);
-            if other == best.1 || !signals.admits(&other) {
-                idle += 1;
-                continue;
-            }
-            (idle, spend, left) = (0, spend - 1, left - 1);
-            let value = hurts(&other)?;
-            if value >= best.0 {
-                best = (value, other);
-            }
-        }
-        flown.push(best);
-    }
-    most_hurting(flown.iter()).cloned().ok_or_else(|| "the search has no start".to_string())
-}
-
-/// The first of those that hurt most.
-fn most_hurting<'a>(flown: impl Iterator<Item = &'a (f64, Signal)>) -> Option<&'a (f64, Signal)> {
-    flown.reduce(|most, other| if other.0 > most.0 { other } else { most })
-}
-
-/// So many changes in a row may change nothing.
-const MOST_IDLE: usize = 1000;
-
-/// What an envelope allows of an error of one: at the end, or on average.
-fn most(envelope: &Envelope, hurt: Hurt, length: f64) -> f64 {
-    match hurt {
-        Hurt::End => envelope.at(length),
-        Hurt::Mean if envelope.rate > 0.0 => {
-            envelope.factor * -(-envelope.rate * length).exp_m1() / (envelope.rate * length)
-        }
-        Hurt::Mean => envelope.factor,
-    }
 }
 
 /// T_0 and the dwell time of a quest from seconds.
@@ -328,7 +237,7 @@ mod tests {
 
     use super::{Hurt, Quest, allowance, worst};
 
-    const BRIEF_LOSSES: &str = include_str!("../../missions/brief-losses.toml");
+    const BRIEF_LOSSES: &str = include_str!("../../../missions/brief-losses.toml");
 
     fn mission(text: &str) -> Mission {
         Mission::parse("m.toml", text).unwrap_or_else(|faults| panic!("{faults}"))
@@ -412,7 +321,7 @@ mod tests {
 
     #[test]
     fn the_law_with_a_state_of_its_own_and_means_are_bounded_too() {
-        const EXAMPLE: &str = include_str!("../../missions/thesis/eq-4-62-example-4-1.toml");
+        const EXAMPLE: &str = include_str!("../../../missions/thesis/eq-4-62-example-4-1.toml");
         let folder = tempfile::tempdir().expect("a folder");
         let duration = "duration_s = ";
         let at = EXAMPLE.find(duration).expect("a duration");
@@ -422,14 +331,5 @@ mod tests {
         let found = worst(&mission(&short), &quest, "m.toml", &folder.path().join("m.toml"), |_| {}).expect("found");
         assert_eq!(found.statement, Some("Lemma 4.7"));
         assert!(found.bound.is_some_and(|bound| bound > found.worst) && found.within == Some(true), "{found:?}");
-    }
-
-    #[test]
-    fn the_mean_of_an_envelope_is_that_of_its_values() {
-        let envelope = super::Envelope { statement: "", factor: 2.0, rate: 0.1 };
-        let values = (0..10_000).map(|i| envelope.at(30.0 * (f64::from(i) + 0.5) / 1e4));
-        let mean = values.sum::<f64>() / 1e4;
-        assert!((super::most(&envelope, Hurt::Mean, 30.0) - mean).abs() < 1e-6);
-        assert_eq!(super::most(&super::Envelope { rate: 0.0, ..envelope }, Hurt::Mean, 30.0), 2.0);
     }
 }

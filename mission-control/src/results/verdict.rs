@@ -1,0 +1,75 @@
+//! The verdict at the head of the report: whether all is well, and what happened in a sentence or two.
+
+use super::html::number;
+use super::vehicle::PATH_THRESHOLD_M;
+use super::{BELOW, Facts, Report, Summary, TheoryRow};
+
+/// How closely a steady error must agree with its prediction to count as predicted.
+const PREDICTED_PART: f64 = 0.1;
+
+/// Whether all is well, and what happened.
+pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
+    let Report { facts, summary, .. } = report;
+    let flown = summary.vehicles.iter().filter(|vehicle| vehicle.rows > 0).count();
+    if flown == 0 {
+        return (false, "Nothing was recorded.".into());
+    }
+    let is_whole = summary.complete && summary.fleet.messages.balanced;
+    let coordinated = (flown > 1).then(|| of_coordination(summary));
+    let parts =
+        [coordinated, Some(of_paths(summary, facts, flown)), of_conditions(report.theory), of_rate(report.theory)];
+    let parts = || parts.iter().flatten();
+    let sentences: Vec<&str> = parts().map(|(_, sentence)| sentence.as_str()).collect();
+    (is_whole && parts().all(|(good, _)| *good), sentences.join(" "))
+}
+
+/// Whether the fleet came together and stayed so to the end.
+fn of_coordination(summary: &Summary) -> (bool, String) {
+    let coordination = &summary.fleet.coordination;
+    let early = coordination.early(summary.duration_s);
+    let (initial, last) = (number(coordination.initial), number(coordination.last));
+    // An error that was never measured is none that is small.
+    let (settled, range) = match (coordination.last_s, early) {
+        (None, _) => (None, "the vehicles were never recorded together".to_owned()),
+        (Some(_), early) => {
+            let settled = coordination.settled_s.or(coordination.settled_absolute_s);
+            let when = early.map_or(String::new(), |at| format!(" at {} s, when all were last recorded", number(at)));
+            (settled, format!("the largest coordination error went from {initial} to {last}{when}"))
+        }
+    };
+    let sentence = match settled {
+        Some(at) => format!("<strong>Coordinated after {} s</strong>: {range}.", number(at)),
+        None => format!("<strong>Not coordinated at the end</strong>: {range}."),
+    };
+    (settled.is_some() && early.is_none(), sentence)
+}
+
+/// Whether every vehicle that flew came to its path, or to the distance from it at which its law leaves it.
+fn of_paths(summary: &Summary, facts: &Facts, flown: usize) -> (bool, String) {
+    let fleet = &summary.fleet;
+    if let Some(at) = fleet.on_path_s {
+        let each = if flown > 1 { "Every vehicle" } else { "The vehicle" };
+        let within = number(PATH_THRESHOLD_M);
+        return (true, format!("{each} stayed within {within} m of its path from {} s on.", number(at)));
+    }
+    // A steady error that theory predicts is no surprise: the design vector δ of Theorem 4.7 leaves one.
+    let biases = facts.vehicles.iter().filter_map(|vehicle| vehicle.predicted_along_bias_m.map(f64::abs));
+    let bias = biases.max_by(f64::total_cmp);
+    let as_predicted = bias.filter(|bias| (fleet.path_error_final_m - bias).abs() <= PREDICTED_PART * bias);
+    let by_design =
+        as_predicted.map_or(String::new(), |bias| format!(", of the {} m that the law leaves by design", number(bias)));
+    let end = number(fleet.path_error_final_m);
+    (as_predicted.is_some(), format!("The largest path-following error at the end was {end} m{by_design}."))
+}
+
+/// Conditions that do not hold, if any.
+fn of_conditions(theory: &[TheoryRow]) -> Option<(bool, String)> {
+    let failed = theory.iter().filter(|row| row.holds == Some(false)).count();
+    let (noun, verb) = if failed == 1 { ("condition", "does") } else { ("conditions", "do") };
+    (failed > 0).then(|| (false, format!("{failed} {noun} of the theory {verb} not hold for this mission.")))
+}
+
+/// A guaranteed rate that was not reached, if one was not.
+fn of_rate(theory: &[TheoryRow]) -> Option<(bool, String)> {
+    theory.iter().any(TheoryRow::is_below).then(|| (false, format!("The coordination error decayed {BELOW}.")))
+}

@@ -1,0 +1,101 @@
+//! The search for the signal that hurts most: from several starts uphill, on several threads.
+
+use common::graph::adversary::{Signal, Signals};
+use common::random::Stream;
+
+use super::Quest;
+
+/// Searches that go on side by side: a fixed number, so that what is found does not depend on the machine.
+const CHAINS: usize = 4;
+
+/// So many changes in a row may change nothing.
+const MOST_IDLE: usize = 1000;
+
+/// The signal that hurts most of those that were flown, and how much it hurts.
+///
+/// # Errors
+/// What could not be flown.
+pub(super) fn search(
+    signals: &Signals,
+    own: Option<Signal>,
+    quest: &Quest,
+    hurts: impl Fn(&Signal) -> Result<f64, String> + Sync,
+) -> Result<(f64, Signal), String> {
+    let starts = starts(signals, own, quest);
+    let chains = CHAINS.min(quest.flights.max(1));
+    let results: Vec<Result<(f64, Signal), String>> = std::thread::scope(|scope| {
+        let chain = |number: usize| {
+            let (starts, hurts) = (&starts, &hurts);
+            scope.spawn(move || {
+                let stream = Stream::new(quest.seed, &format!("worst/{number}"));
+                let more = usize::from(number < quest.flights % chains);
+                let own_starts = starts.iter().skip(number).step_by(chains);
+                climb(signals, own_starts, quest.flights / chains + more, stream, hurts)
+            })
+        };
+        let threads: Vec<_> = (0..chains).map(chain).collect();
+        threads.into_iter().map(|thread| thread.join().map_err(|_| "a search thread ended".to_string())?).collect()
+    });
+    let found = results.into_iter().collect::<Result<Vec<_>, _>>()?;
+    most_hurting(found.iter()).cloned().ok_or_else(|| "no flight was allowed".to_string())
+}
+
+/// Signals to begin with, no more than half of the flights (but one): the mission's own if it is admitted, then periodic
+/// extremes and random ones by turns.
+fn starts(signals: &Signals, own: Option<Signal>, quest: &Quest) -> Vec<Signal> {
+    let mut periodic = signals.periodic_starts();
+    let random = (0..).flat_map(|number| {
+        let random = signals.random_start(number, quest.seed);
+        periodic.next().into_iter().chain([random])
+    });
+    let admitted = random.filter(|signal| signals.admits(signal));
+    own.into_iter().chain(admitted).take((quest.flights / 2).max(CHAINS)).collect()
+}
+
+/// Flies the starts, then climbs from the worst of them: takes every change that hurts no less. With each dwell time it
+/// spends half of the flights that are left, and begins with the worst so far that keeps it.
+///
+/// What it returns hurts no less than anything it has flown.
+fn climb<'a>(
+    signals: &Signals,
+    starts: impl Iterator<Item = &'a Signal>,
+    flights: usize,
+    mut stream: Stream,
+    hurts: impl Fn(&Signal) -> Result<f64, String>,
+) -> Result<(f64, Signal), String> {
+    let mut left = flights.max(1);
+    let mut flown: Vec<(f64, Signal)> = Vec::new();
+    for start in starts.take(left) {
+        left -= 1;
+        flown.push((hurts(start)?, start.clone()));
+    }
+    let dwells = signals.allowance().dwells();
+    for (stage, &dwell) in dwells.iter().enumerate() {
+        let signals = signals.with_dwell(dwell);
+        let mut spend = if stage + 1 < dwells.len() { left / 2 } else { left };
+        let Some(mut best) = most_hurting(flown.iter().filter(|(_, signal)| signals.admits(signal))).cloned() else {
+            continue;
+        };
+        // A change that changes nothing is no flight; where almost nothing can change, the search ends early.
+        let mut idle = 0;
+        while spend > 0 && idle < MOST_IDLE {
+            let other = signals.changed(&best.1, &mut stream);
+            if other == best.1 || !signals.admits(&other) {
+                idle += 1;
+                continue;
+            }
+            (idle, spend, left) = (0, spend - 1, left - 1);
+            let value = hurts(&other)?;
+            if value >= best.0 {
+                best = (value, other);
+            }
+        }
+        flown.push(best);
+    }
+    most_hurting(flown.iter()).cloned().ok_or_else(|| "the search has no start".to_string())
+}
+
+/// The first of those that hurt most.
+fn most_hurting<'a>(flown: impl Iterator<Item = &'a (f64, Signal)>) -> Option<&'a (f64, Signal)> {
+    flown.reduce(|most, other| if other.0 > most.0 { other } else { most })
+}
