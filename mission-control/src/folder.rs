@@ -257,7 +257,8 @@ pub fn shortcomings(merged: &Merged) -> Vec<String> {
     let damaged = merged.damaged.iter().map(|(path, chunks, cause)| {
         format!("{chunks} damaged pieces of {} are left out; the first: {cause}", name(path))
     });
-    cut.chain(damaged).collect()
+    let left_out = merged.left_out.iter().map(|(path, cause)| format!("{} is left out: {cause}", name(path)));
+    cut.chain(damaged).chain(left_out).collect()
 }
 
 /// Whether a run's folder is still to be made. One that was there is somebody's, and not removed again.
