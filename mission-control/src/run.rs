@@ -112,7 +112,10 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         )),
         error => Failure::Unreachable(error.to_string()),
     })?;
-    stop.arm();
+    // Of an own fleet it is armed already, and may have been raised meanwhile.
+    if !own {
+        stop.arm();
+    }
     // A fleet that cannot be reached leaves no folder behind.
     let folder = folder.map_or_else(make_folder, Ok)?;
     let patience = if own { Some(OWN_PATIENCE) } else { plan.patience };
