@@ -533,6 +533,10 @@ impl Port for ConductPort<'_> {
             self.progress.line("stopping the flight; once more ends at once");
             return Next::Feed(ConductInput::Interrupt);
         }
+        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended.is_empty() {
+            let ended = self.processes.ended.join(", ");
+            return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
+        }
         if self.own && !self.processes.running.contains_key(HUB) {
             // Nobody will start it again; what was recorded is worth a report.
             self.progress.line("the network-emulator has ended, and the flight with it");
@@ -542,10 +546,6 @@ impl Port for ConductPort<'_> {
                 missing: Vec::new(),
                 aborted: Vec::new(),
             }));
-        }
-        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended.is_empty() {
-            let ended = self.processes.ended.join(", ");
-            return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
         }
         Next::Go
     }
