@@ -53,8 +53,17 @@ pub fn make(wanted: Option<&Path>, mission: &Mission) -> Result<PathBuf, String>
     if folder.join(RECORDING).exists() {
         return Err(format!("{} holds a run already; give another folder with --out", folder.display()));
     }
+    // What a run that never began left behind may be replaced.
+    let is_in_use = has_logs(&folder) || !folder.join("logs").is_dir();
+    let copy = folder.join(MISSION);
+    if is_in_use && fs::read(&copy).is_ok_and(|there| there != mission.text.as_bytes()) {
+        return Err(format!(
+            "{} is another mission and is not overwritten; give another folder with --out",
+            copy.display()
+        ));
+    }
     fs::create_dir_all(&folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
-    write(&folder.join(MISSION), mission.text.as_bytes())?;
+    write(&copy, mission.text.as_bytes())?;
     Ok(folder)
 }
 
@@ -217,6 +226,12 @@ pub fn logs(folder: &Path, digest: u64) -> Vec<PathBuf> {
     recordings_in(&folder.join("logs").join(format!("{digest:016x}")))
 }
 
+/// Whether there are logs of any mission below a run folder.
+fn has_logs(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder.join("logs")).into_iter().flatten().flatten();
+    entries.into_iter().any(|entry| !recordings_in(&entry.path()).is_empty())
+}
+
 /// The recordings in a folder, in the order of their names.
 pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -293,8 +308,7 @@ pub fn discard(folder: &Path) {
 pub fn recording(run: &Path) -> Result<Recording, String> {
     let path = if run.is_dir() { run.join(RECORDING) } else { run.to_path_buf() };
     if !path.exists() {
-        let logs = run.join("logs").is_dir();
-        let how = if logs {
+        let how = if has_logs(run) {
             format!("; `mission-control report {}` makes it of the logs", run.display())
         } else {
             String::new()
@@ -369,6 +383,36 @@ mod tests {
         prepare("no such device");
         discard(&folder);
         assert!(folder.join("logs/network-emulator.log").exists() && folder.join(MISSION).exists());
+    }
+
+    #[test]
+    fn a_mission_that_is_there_is_not_overwritten_by_another() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let text = include_str!("../../missions/auv-helix.toml");
+        let copy = ground.path().join(MISSION);
+        let make = |text: &str| make(Some(ground.path()), &Mission::parse("m", text).expect("sound"));
+        let other = text.replace("seed = 1", "seed = 2");
+        make(text).expect("makes");
+        make(text).expect("it is the same");
+        let refused = make(&other).expect_err("it is another's");
+        assert!(refused.contains("is another mission and is not overwritten"), "{refused}");
+        assert_eq!(fs::read_to_string(&copy).expect("there"), text);
+        // A run that never began leaves what its processes said; one that began also leaves their logs.
+        fs::create_dir_all(ground.path().join("logs/0123")).expect("makes");
+        make(&other).expect("nothing was recorded");
+        fs::write(ground.path().join("logs/0123/auv1.mcap"), "").expect("writes");
+        make(text).expect_err("`report` needs it to find the logs");
+    }
+
+    #[test]
+    fn logs_are_spoken_of_where_there_are_some() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let logs = ground.path().join("logs/0123");
+        fs::create_dir_all(&logs).expect("makes");
+        let said = || recording(ground.path()).expect_err("there is none");
+        assert!(!said().contains("makes it of the logs"), "{}", said());
+        fs::write(logs.join("auv1.mcap"), "").expect("writes");
+        assert!(said().contains("makes it of the logs"), "{}", said());
     }
 
     #[test]
