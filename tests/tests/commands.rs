@@ -197,6 +197,10 @@ fn diff_recover_and_export_take_what_is_there() {
     let said = ground.controlled(1, &["diff", "a", "cut-recovered.mcap"]);
     assert!(said.contains(" is missing from the second run"), "{said}");
 
+    let mut report = ground.control(&["report", "cut-recovered.mcap"]);
+    report.ends_with(4);
+    let said = report.stderr();
+    assert!(said.contains("is a file; allowed: the folder of a run"), "{said}");
     let said = ground.controlled(0, &["export", "cut-recovered.mcap", "--format", "csv", "--out", "csv"]);
     assert!(said.starts_with(&format!("{} rows to csv/", recovered.exact.len())), "{said}");
     for (file, columns) in [
