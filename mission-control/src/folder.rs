@@ -1,7 +1,7 @@
 //! The run folder: where a flight's files go, and how they come about.
 
 use std::fs;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -49,7 +49,11 @@ pub fn load(path: &Path) -> Result<Arc<Mission>, String> {
 /// # Errors
 /// Where it cannot be made, and why.
 pub fn make(wanted: Option<&Path>, mission: &Mission) -> Result<PathBuf, String> {
-    let folder = wanted.map_or_else(|| free_name(mission), Path::to_path_buf);
+    let Some(folder) = wanted.map(Path::to_path_buf) else {
+        let folder = make_free(&format!("runs/{}-{}", mission.name, utc_stamp(SystemTime::now())))?;
+        write(&folder.join(MISSION), mission.text.as_bytes())?;
+        return Ok(folder);
+    };
     if folder.join(RECORDING).exists() {
         return Err(format!("{} holds a run already; give another folder with --out", folder.display()));
     }
@@ -67,12 +71,22 @@ pub fn make(wanted: Option<&Path>, mission: &Mission) -> Result<PathBuf, String>
     Ok(folder)
 }
 
-fn free_name(mission: &Mission) -> PathBuf {
-    let stem = format!("runs/{}-{}", mission.name, utc_stamp(SystemTime::now()));
-    (1..)
-        .map(|i| PathBuf::from(if i == 1 { stem.clone() } else { format!("{stem}-{i}") }))
-        .find(|path| !path.exists())
-        .unwrap_or_else(|| PathBuf::from(&stem))
+/// Makes a folder of this name, or of the next one that nobody has: two runs may begin in the same second.
+fn make_free(stem: &str) -> Result<PathBuf, String> {
+    let failed = |path: &Path, error: std::io::Error| format!("cannot make {}: {error}", path.display());
+    let within = Path::new(stem).parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(within).map_err(|error| failed(within, error))?;
+    let mut path = PathBuf::from(stem);
+    let mut number = 1;
+    loop {
+        match fs::create_dir(&path) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                number += 1;
+                path = PathBuf::from(format!("{stem}-{number}"));
+            }
+            made => return made.map(|()| path.clone()).map_err(|error| failed(&path, error)),
+        }
+    }
 }
 
 /// Writes a file, or says which one could not be written and why.
@@ -402,6 +416,20 @@ mod tests {
         make(&other).expect("nothing was recorded");
         fs::write(ground.path().join("logs/0123/auv1.mcap"), "").expect("writes");
         make(text).expect_err("`report` needs it to find the logs");
+    }
+
+    #[test]
+    fn runs_that_begin_in_the_same_second_have_folders_of_their_own() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let stem = ground.path().join("runs/helix-2026-01-31-120000").display().to_string();
+        let mut made: Vec<PathBuf> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..8).map(|_| scope.spawn(|| make_free(&stem).expect("makes"))).collect();
+            threads.into_iter().map(|thread| thread.join().expect("ends")).collect()
+        });
+        made.sort();
+        made.dedup();
+        assert_eq!(made.len(), 8);
+        assert!(made.iter().all(|folder| folder.is_dir()) && made[0] == Path::new(&stem), "{made:?}");
     }
 
     #[test]
