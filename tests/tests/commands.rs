@@ -71,6 +71,10 @@ fn what_cannot_be_written_is_exit_code_4() {
         assert_eq!(said.status.code(), Some(4), "{text}");
         assert!(text.contains("cannot write to standard output"), "{text}");
     }
+    let search = ["worst", "mission.toml", "--alpha", "0.1", "--t0", "0.2", "--dwell", "0.1", "--flights", "1"];
+    let mut worst = ground.control(&[&search[..], &["--out", "nowhere/worst.toml"]].concat());
+    worst.ends_with(4);
+    assert!(worst.stderr().contains("cannot write nowhere/worst.toml"), "{}", worst.stderr());
 }
 
 // --- for a person --------------------------------------------------------------------------------------------------------
