@@ -1,7 +1,7 @@
 //! The run folder: where a flight's files go, and how they come about.
 
 use std::fs;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -50,21 +50,44 @@ pub fn load(path: &Path) -> Result<Arc<Mission>, String> {
 /// # Errors
 /// Where it cannot be made, and why.
 pub fn make(wanted: Option<&Path>, mission: &Mission) -> Result<PathBuf, String> {
-    let folder = wanted.map_or_else(|| free_name(mission), Path::to_path_buf);
+    let Some(folder) = wanted.map(Path::to_path_buf) else {
+        let folder = make_free(&format!("runs/{}-{}", mission.name, utc_stamp(SystemTime::now())))?;
+        write(&folder.join(MISSION), mission.text.as_bytes())?;
+        return Ok(folder);
+    };
     if folder.join(RECORDING).exists() {
         return Err(format!("{} holds a run already; give another folder with --out", folder.display()));
     }
+    // What a run that never began left behind may be replaced.
+    let is_in_use = has_logs(&folder) || !folder.join("logs").is_dir();
+    let copy = folder.join(MISSION);
+    if is_in_use && fs::read(&copy).is_ok_and(|there| there != mission.text.as_bytes()) {
+        return Err(format!(
+            "{} is another mission and is not overwritten; give another folder with --out",
+            copy.display()
+        ));
+    }
     fs::create_dir_all(&folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
-    write(&folder.join(MISSION), mission.text.as_bytes())?;
+    write(&copy, mission.text.as_bytes())?;
     Ok(folder)
 }
 
-fn free_name(mission: &Mission) -> PathBuf {
-    let stem = format!("runs/{}-{}", mission.name, utc_stamp(SystemTime::now()));
-    (1..)
-        .map(|i| PathBuf::from(if i == 1 { stem.clone() } else { format!("{stem}-{i}") }))
-        .find(|path| !path.exists())
-        .unwrap_or_else(|| PathBuf::from(&stem))
+/// Makes a folder of this name, or of the next one that nobody has: two runs may begin in the same second.
+fn make_free(stem: &str) -> Result<PathBuf, String> {
+    let failed = |path: &Path, error: std::io::Error| format!("cannot make {}: {error}", path.display());
+    let within = Path::new(stem).parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(within).map_err(|error| failed(within, error))?;
+    let mut path = PathBuf::from(stem);
+    let mut number = 1;
+    loop {
+        match fs::create_dir(&path) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                number += 1;
+                path = PathBuf::from(format!("{stem}-{number}"));
+            }
+            made => return made.map(|()| path.clone()).map_err(|error| failed(&path, error)),
+        }
+    }
 }
 
 /// Writes a file, or says which one could not be written and why.
@@ -218,6 +241,12 @@ pub fn logs(folder: &Path, digest: u64) -> Vec<PathBuf> {
     recordings_in(&folder.join("logs").join(format!("{digest:016x}")))
 }
 
+/// Whether there are logs of any mission below a run folder.
+fn has_logs(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder.join("logs")).into_iter().flatten().flatten();
+    entries.into_iter().any(|entry| !recordings_in(&entry.path()).is_empty())
+}
+
 /// The recordings in a folder, in the order of their names.
 pub fn recordings_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -283,8 +312,7 @@ pub fn discard(folder: &Path) {
 pub fn recording(run: &Path) -> Result<Recording, String> {
     let path = if run.is_dir() { run.join(RECORDING) } else { run.to_path_buf() };
     if !path.exists() {
-        let logs = run.join("logs").is_dir();
-        let how = if logs {
+        let how = if has_logs(run) {
             format!("; `mission-control report {}` makes it of the logs", run.display())
         } else {
             String::new()
@@ -359,6 +387,50 @@ mod tests {
         prepare("no such device");
         discard(&folder);
         assert!(folder.join("logs/network-emulator.log").exists() && folder.join(MISSION).exists());
+    }
+
+    #[test]
+    fn a_mission_that_is_there_is_not_overwritten_by_another() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let text = include_str!("../../missions/auv-helix.toml");
+        let copy = ground.path().join(MISSION);
+        let make = |text: &str| make(Some(ground.path()), &Mission::parse("m", text).expect("sound"));
+        let other = text.replace("seed = 1", "seed = 2");
+        make(text).expect("makes");
+        make(text).expect("it is the same");
+        let refused = make(&other).expect_err("it is another's");
+        assert!(refused.contains("is another mission and is not overwritten"), "{refused}");
+        assert_eq!(fs::read_to_string(&copy).expect("there"), text);
+        // A run that never began leaves what its processes said; one that began also leaves their logs.
+        fs::create_dir_all(ground.path().join("logs/0123")).expect("makes");
+        make(&other).expect("nothing was recorded");
+        fs::write(ground.path().join("logs/0123/auv1.mcap"), "").expect("writes");
+        make(text).expect_err("`report` needs it to find the logs");
+    }
+
+    #[test]
+    fn runs_that_begin_in_the_same_second_have_folders_of_their_own() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let stem = ground.path().join("runs/helix-2026-01-31-120000").display().to_string();
+        let mut made: Vec<PathBuf> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..8).map(|_| scope.spawn(|| make_free(&stem).expect("makes"))).collect();
+            threads.into_iter().map(|thread| thread.join().expect("ends")).collect()
+        });
+        made.sort();
+        made.dedup();
+        assert_eq!(made.len(), 8);
+        assert!(made.iter().all(|folder| folder.is_dir()) && made[0] == Path::new(&stem), "{made:?}");
+    }
+
+    #[test]
+    fn logs_are_spoken_of_where_there_are_some() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let logs = ground.path().join("logs/0123");
+        fs::create_dir_all(&logs).expect("makes");
+        let said = || recording(ground.path()).expect_err("there is none");
+        assert!(!said().contains("makes it of the logs"), "{}", said());
+        fs::write(logs.join("auv1.mcap"), "").expect("writes");
+        assert!(said().contains("makes it of the logs"), "{}", said());
     }
 
     #[test]

@@ -8,14 +8,15 @@ use common::time::{Span, Time};
 use common::wire::fleet::Pace;
 use common::wire::vehicle::Phase;
 
-/// Logs that end in the middle, and pieces of them that are left out because they are damaged.
+/// Logs that end in the middle, pieces of them that are left out because they are damaged, and logs that are no recordings.
 pub(crate) fn damage(merged: &Merged) -> Vec<String> {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let cut = merged.incomplete.iter().map(|path| format!("{} ends in the middle", name(path)));
     let damaged = merged.damaged.iter().map(|(path, chunks, cause)| {
         format!("{chunks} damaged pieces of {} are left out; the first: {cause}", name(path))
     });
-    cut.chain(damaged).collect()
+    let left_out = merged.left_out.iter().map(|(path, cause)| format!("{} is left out: {cause}", name(path)));
+    cut.chain(damaged).chain(left_out).collect()
 }
 
 /// Vehicles without states up to the end of the flight, with what is to be told of each: they were lost, or what they recorded was.

@@ -112,7 +112,10 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         }
     };
     let (line, events) = connect(endpoint, plan.patience())?;
-    stop.arm();
+    // Of an own fleet it is armed already, and may have been raised meanwhile.
+    if !plan.is_own() {
+        stop.arm();
+    }
     // A fleet that cannot be reached leaves no folder behind.
     let folder = folder.map_or_else(make_folder, Ok)?;
     let collected = folder.join(".collected");
@@ -430,6 +433,10 @@ impl Port for ConductPort<'_> {
             self.progress.line("stopping the flight; once more ends at once");
             return Next::Feed(ConductInput::Interrupt);
         }
+        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended().is_empty() {
+            let ended = self.processes.ended().join(", ");
+            return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
+        }
         if self.own && !self.processes.has_hub() {
             // Nobody will start it again; what was recorded is worth a report.
             self.progress.line("the network-emulator has ended, and the flight with it");
@@ -439,10 +446,6 @@ impl Port for ConductPort<'_> {
                 missing: Vec::new(),
                 aborted: Vec::new(),
             }));
-        }
-        if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended().is_empty() {
-            let ended = self.processes.ended().join(", ");
-            return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
         }
         Next::Go
     }

@@ -442,15 +442,47 @@ fn the_terminals_interrupt_ends_an_own_flight_with_its_report() {
     assert_reported(&ground);
 }
 
-/// Kill -9 for the process of an own flight that was started with this word.
-fn kill_own(control: &Process, word: &str) {
+/// The process of an own flight that was started with this word.
+fn own(control: &Process, word: &str) -> Option<Pid> {
     let id = control.id();
     let children = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux");
     let is_meant = |pid: &&str| {
         fs::read_to_string(format!("/proc/{pid}/cmdline")).is_ok_and(|words| words.split('\0').any(|one| one == word))
     };
-    let meant = children.split_whitespace().find(is_meant).expect("it runs").parse().expect("a number");
-    kill_process(Pid::from_raw(meant).expect("a process"), Signal::KILL).expect("it is there");
+    let meant = children.split_whitespace().find(is_meant)?;
+    Pid::from_raw(meant.parse().expect("a number"))
+}
+
+/// Kill -9 for it.
+fn kill_own(control: &Process, word: &str) {
+    kill_process(own(control, word).expect("it runs"), Signal::KILL).expect("it is there");
+}
+
+/// It may come before mission-control has found its own emulator.
+#[test]
+fn an_interrupt_before_the_start_of_an_own_flight_is_heard() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text(MISSION));
+    let mut control = ground.control(&["run", "mission.toml", "--listen", "tcp/127.0.0.1:0", "--out", "run"]);
+    until(PATIENCE, "the processes are started", || control.stderr().contains("listens on"));
+    kill_process(Pid::from_raw(control.id() as i32).expect("a process"), Signal::INT).expect("it is there");
+    control.ends_with(1);
+    assert!(control.stderr().contains("interrupted before the start"), "{}", control.stderr());
+}
+
+#[test]
+fn an_own_emulator_that_dies_before_the_start_is_exit_code_3() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text(MISSION));
+    let mut control = ground.control(&["run", "mission.toml", "--listen", "tcp/127.0.0.1:0", "--out", "run"]);
+    // A vehicle that is frozen is not armed: the flight does not start.
+    let c = cpf_tests::found(PATIENCE, "the last vehicle is started", || own(&control, "c"));
+    kill_process(c, Signal::STOP).expect("it is there");
+    until(PATIENCE, "contact", || control.stderr().contains("contact: "));
+    kill_own(&control, "network-emulator");
+    control.ends_with(3);
+    let said = control.stderr();
+    assert!(said.contains("network-emulator has ended") && said.contains("before the flight"), "{said}");
 }
 
 #[test]

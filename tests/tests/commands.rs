@@ -71,6 +71,10 @@ fn what_cannot_be_written_is_exit_code_4() {
         assert_eq!(said.status.code(), Some(4), "{text}");
         assert!(text.contains("cannot write to standard output"), "{text}");
     }
+    let search = ["worst", "mission.toml", "--alpha", "0.1", "--t0", "0.2", "--dwell", "0.1", "--flights", "1"];
+    let mut worst = ground.control(&[&search[..], &["--out", "nowhere/worst.toml"]].concat());
+    worst.ends_with(4);
+    assert!(worst.stderr().contains("cannot write nowhere/worst.toml"), "{}", worst.stderr());
 }
 
 // --- for a person --------------------------------------------------------------------------------------------------------
@@ -197,6 +201,10 @@ fn diff_recover_and_export_take_what_is_there() {
     let said = ground.controlled(1, &["diff", "a", "cut-recovered.mcap"]);
     assert!(said.contains(" is missing from the second run"), "{said}");
 
+    let mut report = ground.control(&["report", "cut-recovered.mcap"]);
+    report.ends_with(4);
+    let said = report.stderr();
+    assert!(said.contains("is a file; allowed: the folder of a run"), "{said}");
     let said = ground.controlled(0, &["export", "cut-recovered.mcap", "--format", "csv", "--out", "csv"]);
     assert!(said.starts_with(&format!("{} rows to csv/", recovered.exact.len())), "{said}");
     for (file, columns) in [

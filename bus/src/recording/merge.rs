@@ -100,6 +100,8 @@ pub struct Merged {
     pub incomplete: Vec<PathBuf>,
     /// Inputs with damaged chunks, which were left out: how many, and what was wrong with the first.
     pub damaged: Vec<(PathBuf, u64, String)>,
+    /// Inputs that are no recordings, with the reason: they are left out.
+    pub left_out: Vec<(PathBuf, String)>,
     /// When the states of each vehicle begin and end \[ns\].
     pub spans: BTreeMap<Name, (i64, i64)>,
 }
@@ -161,11 +163,27 @@ struct Input {
     next: Option<Row>,
 }
 
-fn open_all<P: AsRef<Path>>(inputs: &[P]) -> Result<(Origin, Vec<Input>)> {
+/// All inputs of a merge.
+struct Inputs {
+    origin: Origin,
+    opened: Vec<Input>,
+    left_out: Vec<(PathBuf, String)>,
+}
+
+/// Opens all inputs. What is no recording, its first bytes being damaged for instance, does not cost the others; but if
+/// nothing else is there, it is an error.
+fn open_all<P: AsRef<Path>>(inputs: &[P]) -> Result<Inputs> {
     let mut origin: Option<(Origin, PathBuf)> = None;
     let mut opened = Vec::with_capacity(inputs.len());
+    let mut left_out = Vec::new();
     for path in inputs {
-        let mut rows = RowReader::open(path)?;
+        let mut rows = match RowReader::open(path) {
+            Err(RecordingError { place, cause: Cause::Format(cause) }) if left_out.len() + 1 < inputs.len() => {
+                left_out.push((place, cause));
+                continue;
+            }
+            opened => opened?,
+        };
         match &origin {
             // A file that was cut before its mission says nothing about the run, and holds no rows.
             _ if *rows.origin() == Origin::default() => {}
@@ -179,16 +197,19 @@ fn open_all<P: AsRef<Path>>(inputs: &[P]) -> Result<(Origin, Vec<Input>)> {
         let next = rows.next().transpose()?;
         opened.push(Input { rows, next });
     }
-    Ok((origin.map(|(origin, _)| origin).unwrap_or_default(), opened))
+    Ok(Inputs { origin: origin.map(|(origin, _)| origin).unwrap_or_default(), opened, left_out })
 }
 
 fn merge_in_stream<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {
-    let (origin, mut inputs) = open_all(inputs)?;
-    let mut recorder = create(output, &origin)?;
+    let mut inputs = open_all(inputs)?;
+    let mut recorder = create(output, &inputs.origin)?;
     let mut spans = BTreeMap::new();
     // At each turn, the input whose next row is earliest; on a tie the first, so that input order is kept.
-    while let Some(input) =
-        inputs.iter_mut().filter(|input| input.next.is_some()).min_by_key(|input| input.next.as_ref().map(Row::t_ns))
+    while let Some(input) = inputs
+        .opened
+        .iter_mut()
+        .filter(|input| input.next.is_some())
+        .min_by_key(|input| input.next.as_ref().map(Row::t_ns))
     {
         if let Some(row) = input.next.take() {
             note_span(&mut spans, &row);
@@ -196,26 +217,26 @@ fn merge_in_stream<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged
         }
         input.next = input.rows.next().transpose()?;
     }
-    finish(recorder, output, &inputs, spans)
+    finish(recorder, output, inputs, spans)
 }
 
 fn merge_in_memory<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {
-    let (origin, mut inputs) = open_all(inputs)?;
+    let mut inputs = open_all(inputs)?;
     let mut all = Vec::new();
-    for input in &mut inputs {
+    for input in &mut inputs.opened {
         all.extend(input.next.take());
         for row in &mut input.rows {
             all.push(row?);
         }
     }
     all.sort_by(canonical_order);
-    let mut recorder = create(output, &origin)?;
+    let mut recorder = create(output, &inputs.origin)?;
     let mut spans = BTreeMap::new();
     for row in all {
         note_span(&mut spans, &row);
         recorder.write(row)?;
     }
-    finish(recorder, output, &inputs, spans)
+    finish(recorder, output, inputs, spans)
 }
 
 /// Rows come in order of time.
@@ -237,7 +258,7 @@ fn create(output: &Path, origin: &Origin) -> Result<CanonicalRecorder<BufWriter<
 fn finish(
     mut recorder: CanonicalRecorder<BufWriter<File>>,
     output: &Path,
-    inputs: &[Input],
+    Inputs { opened, left_out, .. }: Inputs,
     spans: BTreeMap<Name, (i64, i64)>,
 ) -> Result<Merged> {
     recorder.close_instant()?;
@@ -245,12 +266,12 @@ fn finish(
     let file = recorder.finish()?;
     file.get_ref().sync_all().map_err(|cause| RecordingError::io(output, cause))?;
     let place = |input: &Input| input.rows.place().to_owned();
-    let incomplete = inputs.iter().filter(|input| !input.rows.is_complete() && input.rows.skipped() == 0);
-    let damaged = inputs.iter().filter_map(|input| {
+    let incomplete = opened.iter().filter(|input| !input.rows.is_complete() && input.rows.skipped() == 0);
+    let damaged = opened.iter().filter_map(|input| {
         let cause = input.rows.damage().unwrap_or_default().to_owned();
         (input.rows.skipped() > 0).then(|| (place(input), input.rows.skipped(), cause))
     });
-    Ok(Merged { rows, incomplete: incomplete.map(place).collect(), damaged: damaged.collect(), spans })
+    Ok(Merged { rows, incomplete: incomplete.map(place).collect(), damaged: damaged.collect(), left_out, spans })
 }
 
 /// The temporary file that becomes `output`; beside it, so that renaming does not copy.
@@ -363,11 +384,28 @@ mod tests {
         let output = directory.path().join("recording.mcap");
         let merged = merge(&[&whole, &cut], &output).expect("merges");
         let spans = BTreeMap::from([("a".into(), (0, 0))]);
-        assert_eq!(merged, Merged { rows: 3, incomplete: vec![cut.clone()], damaged: vec![], spans });
+        assert_eq!(merged, Merged { rows: 3, incomplete: vec![cut.clone()], damaged: vec![], left_out: vec![], spans });
 
         let recovered = recover(&cut, directory.path().join("recovered.mcap")).expect("recovers");
         assert_eq!(recovered, Recovered { rows: 1, was_complete: false, damage: None });
         assert!(read(directory.path().join("recovered.mcap")).expect("reads").complete);
+    }
+
+    #[test]
+    fn what_is_no_recording_does_not_cost_the_others() {
+        let directory = tempfile::tempdir().expect("directory");
+        let (sound, broken) = (directory.path().join("sound.mcap"), directory.path().join("broken.mcap"));
+        let mut recorder = Recorder::create(&sound, &origin()).expect("starts");
+        recorder.write(&state(0, "a", 0.0)).expect("writes");
+        recorder.finish().expect("ends");
+        fs::write(&broken, "no magic at all").expect("writes");
+        let output = directory.path().join("recording.mcap");
+        let merged = merge(&[&broken, &sound], &output).expect("merges");
+        assert_eq!(merged.rows, 1);
+        let [(path, cause)] = &merged.left_out[..] else { panic!("{merged:?}") };
+        assert!(*path == broken && cause.contains("magic"), "{cause}");
+        assert_eq!(read(&output).expect("reads").seed, origin().seed);
+        merge(&[&broken], &output).expect_err("there is nothing else");
     }
 
     #[test]

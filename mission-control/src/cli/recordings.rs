@@ -19,6 +19,10 @@ pub(super) enum Format {
 }
 
 pub(super) fn report(run: &Path) -> Ended {
+    if run.is_file() {
+        let reason = format!("{} is a file; allowed: the folder of a run, for the report goes there", run.display());
+        return Err(End(4, reason));
+    }
     for text in folder::salvage(run).map_err(|error| End(4, error))?.unwrap_or_default() {
         bus::remark!("{text}");
     }

@@ -52,7 +52,10 @@ pub(super) fn worst(args: &WorstArgs) -> Ended {
     let source = quoted(args.mission.display().to_string());
     let found = worst::worst(&mission, &quest, &source, &out, reached);
     progress.lock().unwrap_or_else(PoisonError::into_inner).done();
-    let found = found.map_err(|reason| End(2, reason))?;
+    let found = found.map_err(|reason| match reason {
+        worst::Unfound::Refused(reason) => End(2, reason),
+        worst::Unfound::Unwritten(reason) => End(4, reason),
+    })?;
     if args.json {
         bus::tell!("{}", serde_json::to_string_pretty(&found).map_err(|error| End(4, error.to_string()))?);
     } else {

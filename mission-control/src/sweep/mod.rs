@@ -185,6 +185,37 @@ mod tests {
     }
 
     #[test]
+    fn a_table_with_twins_and_garbled_numbers_is_made_whole() {
+        let (_folder, out) = temporary();
+        let plan = plan("network.loss=0,0.5", 2);
+        sweep(&plan, &out, |_, _| true).expect("swept");
+        let whole = runs_csv(&out);
+        let lines: Vec<&str> = whole.lines().collect();
+        let number = lines[1].rsplit(',').find(|field| field.contains('.')).expect("a number");
+        for garbled in ["nan", "0.1x"] {
+            // The first run has a number that is none, the second is there twice, and the third not at all.
+            let broken = lines[1].replace(number, garbled);
+            let table = [lines[0], &broken, lines[2], lines[2], lines[4], ""].join("\n");
+            fs::write(out.join(RUNS), table).expect("written");
+            let again = sweep(&plan, &out, |_, _| true).expect("swept");
+            assert!(again.complete && again.found == 2, "{} found", again.found);
+            assert_eq!(runs_csv(&out), whole);
+        }
+    }
+
+    #[test]
+    fn a_table_without_its_head_is_not_overwritten() {
+        let (_folder, out) = temporary();
+        let plan = plan("network.loss=0,0.5", 1);
+        sweep(&plan, &out, |_, _| true).expect("swept");
+        let table = runs_csv(&out);
+        fs::remove_file(out.join("sweep.json")).expect("there");
+        let refused = sweep(&plan, &out, |_, _| true).expect_err("whose is it?");
+        assert!(refused.contains("is not overwritten"), "{refused}");
+        assert_eq!(runs_csv(&out), table);
+    }
+
+    #[test]
     fn a_sweep_that_is_enlarged_keeps_its_runs_and_another_is_not_mixed_in() {
         let (_folder, out) = temporary();
         sweep(&plan("network.loss=0,0.5", 2), &out, |_, _| true).expect("swept");

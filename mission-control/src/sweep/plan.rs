@@ -45,6 +45,15 @@ impl Plan {
         if let Some(twice) = settings.iter().enumerate().find(|(i, s)| settings[..*i].iter().any(|o| o.key == s.key)) {
             return Err(format!("--set {}: found twice; allowed: once, with all of its values", twice.1.key));
         }
+        if let Some(setting) = settings.iter().find(|setting| setting.key == "seed") {
+            let why = "every run has a seed of its own, made from the mission's; for several of them say --repeat";
+            return Err(format!("--set {}: found in a sweep; allowed: other keys ({why})", setting.key));
+        }
+        for Setting { key, values } in &settings {
+            if let Some(twice) = values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)) {
+                return Err(format!("--set {key}: found {} twice; allowed: every value once", shown(twice.1)));
+            }
+        }
         let count =
             settings.iter().try_fold(repeats as usize, |count, setting| count.checked_mul(setting.values.len()));
         if !count.is_some_and(|count| (1..=MOST_RUNS).contains(&count)) {
@@ -170,7 +179,9 @@ mod tests {
             ),
             (&["coordination.b0=1"][..], "coordination.b0: found an unknown key; allowed: "),
             (&["duration_s=1", "duration_s=2"][..], "--set duration_s: found twice"),
-            (&["duration_s=1:10000:1", "seed=1:1000:1"][..], "found 10000000 runs"),
+            (&["duration_s=1,2,1.0,1"][..], "--set duration_s: found 1 twice; allowed: every value once"),
+            (&["seed=1,2"][..], "--set seed: found in a sweep; allowed: other keys"),
+            (&["duration_s=1:10000:1", "network.loss=0:0.999:0.001"][..], "found 10000000 runs"),
         ] {
             let found = plan(sets, 1).expect_err("refused");
             assert!(found.contains(reason), "{found}");

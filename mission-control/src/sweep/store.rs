@@ -1,8 +1,8 @@
 //! The runs of a sweep on disk: each is appended as it is over, so that an interrupted sweep goes on where it was.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -82,7 +82,15 @@ impl Store {
                 }
                 read(whole, plan).map_err(|reason| format!("{}: {reason}", path.display()))?
             }
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(format!("cannot read {}: {error}", folder.join(HEAD).display()));
+            }
             Err(_) => {
+                if fs::read(&path).is_ok_and(|table| table.iter().filter(|byte| **byte == b'\n').count() > 1) {
+                    let reason =
+                        format!("has no {HEAD} beside it and is not overwritten: give another folder with --out");
+                    return Err(format!("{} {reason}", path.display()));
+                }
                 write(&path, line(&columns(plan)).as_bytes())?;
                 write(&folder.join(HEAD), &serde_json::to_vec_pretty(&head).unwrap_or_default())?;
                 Vec::new()
@@ -136,7 +144,8 @@ fn line(fields: &[String]) -> String {
     String::from_utf8(bytes.unwrap_or_default()).unwrap_or_default()
 }
 
-/// The runs of the plan in a table; others, of a sweep that was larger, are left where they are.
+/// The runs of the plan in a table, each once: two sweeps at a time may have flown the same. Others, of a sweep that was
+/// larger, are left out, and so are those with a number that cannot be read: they are flown again.
 fn read(text: &str, plan: &Plan) -> Result<Vec<Run>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let expected = columns(plan);
@@ -151,6 +160,11 @@ fn read(text: &str, plan: &Plan) -> Result<Vec<Run>, String> {
     let keys = plan.settings.len();
     let cells: HashMap<Vec<String>, usize> =
         plan.cells.iter().enumerate().map(|(index, cell)| (cell.values.iter().map(shown).collect(), index)).collect();
+    let number = |field: &str| match field {
+        "" => Some(None),
+        _ => field.parse::<f64>().ok().filter(|value| value.is_finite()).map(Some),
+    };
+    let mut there = HashSet::new();
     let mut runs = Vec::new();
     for row in reader.records() {
         let row: Vec<String> = row.map_err(|error| error.to_string())?.iter().map(String::from).collect();
@@ -158,7 +172,8 @@ fn read(text: &str, plan: &Plan) -> Result<Vec<Run>, String> {
         if repeat >= plan.repeats || row[keys + 1] != plan.seed(cell, repeat).to_string() {
             continue;
         }
-        let numbers = row[keys + 3..].iter().map(|field| field.parse().ok()).collect();
+        let numbers: Option<Vec<Option<f64>>> = row[keys + 3..].iter().map(|field| number(field)).collect();
+        let Some(numbers) = numbers.filter(|_| there.insert((cell, repeat))) else { continue };
         runs.push(Run { cell, repeat, outcome: row[keys + 2].clone(), numbers });
     }
     Ok(runs)

@@ -152,6 +152,21 @@ fn fly(text: &str) -> Result<Errors, String> {
     Ok(Errors { initial, end, mean: norms.iter().sum::<f64>() / instants as f64 })
 }
 
+/// Why no worst signal was found, or none could be saved.
+#[derive(Debug)]
+pub enum Unfound {
+    /// It cannot be searched or flown.
+    Refused(String),
+    /// Its file cannot be written.
+    Unwritten(String),
+}
+
+impl From<String> for Unfound {
+    fn from(reason: String) -> Unfound {
+        Unfound::Refused(reason)
+    }
+}
+
 /// Searches, on four threads, and saves the mission with the worst signal found as `out`, with what it was found by. `source` is
 /// how the mission is called on the command line.
 ///
@@ -165,7 +180,7 @@ pub fn worst(
     source: &str,
     out: &std::path::Path,
     progress: impl Fn(usize) + Sync,
-) -> Result<Worst, String> {
+) -> Result<Worst, Unfound> {
     let file: MissionFile = toml::from_str(&mission.text).map_err(|error| error.to_string())?;
     let id = |i: usize| mission.vehicles[i].id.clone();
     let links = mission.links.iter().map(|link| [id(link.from), id(link.to)]).collect();
@@ -198,7 +213,7 @@ pub fn worst(
         quest.flights,
         quest.seed
     );
-    std::fs::write(out, head + &text).map_err(|error| format!("cannot write {}: {error}", out.display()))?;
+    crate::folder::write(out, (head + &text).as_bytes()).map_err(Unfound::Unwritten)?;
 
     let length = mission.end - Time::ZERO;
     let allowed = |envelope: &Envelope| initial * quest.hurt.allowed(envelope, length.secs());

@@ -8,7 +8,7 @@ use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
 
-use super::{COLLECTOR, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
+use super::{COLLECTOR, FASTEST, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
 use crate::emulator::Emulator;
 
 impl Hub {
@@ -171,8 +171,9 @@ impl Hub {
     }
 
     pub(super) fn speed(&mut self, now: Time, speed: f64) {
-        if !speed.is_finite() {
-            return self.refuse(format!("found a formation speed of {speed}; allowed: a finite number"));
+        if speed.is_nan() || speed.abs() > FASTEST {
+            let allowed = "-1000000 to 1000000 units of xi per s, as in a mission file";
+            return self.refuse(format!("found a formation speed of {speed:?}; allowed: {allowed}"));
         }
         let Some(load) = self.load.as_mut().filter(|load| load.phase == Phase::Running) else {
             return self.refuse("no flight is under way, so there is no speed to change".into());

@@ -33,6 +33,8 @@ const SPEED_LEAD_S: f64 = 0.25;
 
 /// Most speeds that are commanded in a flight: one a second for nearly three hours.
 const MOST_SPEEDS: usize = 10_000;
+/// Greatest formation speed that can be commanded, either way: the greatest of a mission file \[units of xi per s\].
+const FASTEST: f64 = 1e6;
 
 /// A flight that is taken up from a vehicle does not begin later than this much from now \[s of wall clock\].
 const LATEST_BEGIN_S: f64 = 60.0;

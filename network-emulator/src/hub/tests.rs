@@ -155,6 +155,23 @@ fn a_speed_that_is_no_number_is_refused() {
     }
 }
 
+/// Robots on straight lines have no speed of their own that they cannot follow, and would fly out of all numbers.
+#[test]
+fn a_speed_that_no_mission_file_may_have_is_refused() {
+    let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    let mut command = |speed| ask(&mut hub, Time::from_secs(1.0), ToFleet::Speed { speed });
+    for speed in [1e308, -1.1e6] {
+        let said = command(speed);
+        assert!(refusal(&said).is_some_and(|why| why.ends_with("as in a mission file")), "{said:?}");
+    }
+    let text = |speed: &str| {
+        let robots = include_str!("../../../tests/missions/parallel-three.toml");
+        robots.replace("speed = 0.5", &format!("speed = {speed}"))
+    };
+    assert!(text("9") != text("8"), "the speed is found in the file");
+    assert!(Mission::parse("m", &text("1e6")).is_ok() && Mission::parse("m", &text("1.1e6")).is_err());
+}
+
 fn ended(hub: &mut Hub, at_s: f64, id: &str, reason: &str) -> Vec<HubOutput> {
     let message = FromVehicle::Ended { phase: Phase::Aborted, reason: reason.into() };
     hub.handle(Time::from_secs(at_s), Some(HubInput::FromVehicle(id.into(), message)));
