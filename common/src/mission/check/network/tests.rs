@@ -87,10 +87,10 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "30 days",
         ),
         (
-            "switching = { connected_in_mean = { window_s = 7.9, dwell_s = 1.0 } }",
+            "switching = { connected_in_mean = { window_s = 4.9, dwell_s = 1.0 } }",
             "switching.connected_in_mean.window_s",
-            "7.9 s",
-            "at least 8 s",
+            "4.9 s",
+            "at least 5 s",
         ),
         (
             "switching = { trace = { links = [] } }",
