@@ -39,6 +39,24 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "above min_s",
         ),
         ("delay = { gamma = { mean_s = 1.0, deviation_s = 100.0 } }", "delay.gamma.deviation_s", "100", "10 times"),
+        (
+            "delay = { normal = { mean_s = 1.0, deviation_s = 0.01, min_s = 3000.0 } }",
+            "delay.normal.mean_s",
+            "1",
+            "min_s to 3600 s",
+        ),
+        (
+            "delay = { normal = { mean_s = 600.0, deviation_s = 601.0 } }",
+            "delay.normal.deviation_s",
+            "601",
+            "at most 600: mean_s + 5 deviation_s",
+        ),
+        (
+            "delay = { gamma = { mean_s = 600.0, deviation_s = 3600.0 } }",
+            "delay.gamma.deviation_s",
+            "3600",
+            "at most 600: mean_s + 5 deviation_s",
+        ),
         ("delay = { distance = { speed_mps = 0.0 } }", "delay.distance.speed_mps", "0", "1 to 3e8 m/s"),
         (
             "loss = { gilbert_elliott = { mean_burst = 0.5, mean_gap = 5.0 } }",
