@@ -18,6 +18,7 @@ use crate::gallery::{GALLERY, Gallery};
 use crate::results::report::told;
 use crate::results::{ClockVerdict, Summary, TheoryRow, compare as compare_runs, export_csv, network_section};
 use crate::run::{Failure, Plan, fly};
+use crate::sweep::Broken;
 use crate::sweep::measure::index_of;
 use crate::sweep::plan::{self, Plan as SweepPlan};
 use crate::sweep::setting::Setting;
@@ -84,7 +85,7 @@ enum What {
     },
     /// Fly a mission with every combination of some values, each several times, and sum up what came of it
     #[command(
-        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 5\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, 4 files cannot be read or written."
+        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 5\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, or a folder with runs that this sweep would lose,\n  4 files cannot be read or written."
     )]
     Sweep {
         /// The mission file
@@ -99,7 +100,7 @@ enum What {
         /// The number that is drawn; a column of runs.csv
         #[arg(long, value_name = "COLUMN", default_value = "coordination_last")]
         measure: String,
-        /// The sweep's folder; the same command goes on with what is there (default: runs/sweep-MISSION)
+        /// The sweep's folder; the same command, or one of a larger sweep, goes on with what is there (default: runs/sweep-MISSION)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -510,7 +511,7 @@ fn sweep(path: &Path, sets: &[String], repeat: u32, measure: &str, out: Option<P
         !stop.is_raised()
     });
     progress.done();
-    let swept = swept.map_err(|reason| End(4, reason))?;
+    let swept = swept.map_err(broken)?;
     if !swept.complete {
         return Err(interrupted(&out));
     }
@@ -539,11 +540,15 @@ fn study(path: &Path, out: Option<PathBuf>) -> Ended {
         !stop.is_raised()
     });
     progress.done();
-    if !complete.map_err(|reason| End(4, reason))? {
+    if !complete.map_err(broken)? {
         return Err(interrupted(&out));
     }
     bus::tell!("{} runs: {}", study.runs(), out.join("README.md").display());
     Ok(ExitCode::SUCCESS)
+}
+
+fn broken(broken: Broken) -> End {
+    End(broken.exit_code(), broken.to_string())
 }
 
 fn interrupted(out: &Path) -> End {
