@@ -91,7 +91,8 @@ enum What {
         /// The mission file
         mission: PathBuf,
         /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated. For short:
-        /// network.loss, network.delay, and coordination.GAIN for a gain of the mission's law
+        /// network.loss and network.delay for independent losses and a constant delay in place of the mission's models, and
+        /// coordination.GAIN for a gain of the mission's law
         #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
         sets: Vec<String>,
         /// Runs of every combination, each with a seed of its own

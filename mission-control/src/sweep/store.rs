@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::measure::MEASURES;
 use super::Broken;
+use super::measure::MEASURES;
 use super::plan::Plan;
 use super::setting::shown;
 use crate::folder::write;
@@ -94,7 +94,8 @@ impl Store {
                 }
                 let rows = fs::read_to_string(&path).map_or(0, |text| text.lines().skip(1).count());
                 if rows > 0 {
-                    let found = format!("{} with {rows} runs, and no {HEAD} that says of which mission", path.display());
+                    let found =
+                        format!("{} with {rows} runs, and no {HEAD} that says of which mission", path.display());
                     return Err(Broken::Refused(format!("found {found}; allowed: another folder with --out")));
                 }
                 write(&path, line(&columns(plan)).as_bytes())?;
@@ -188,9 +189,10 @@ fn read(text: &str, plan: &Plan) -> Result<Held, String> {
     let mut held = Held { runs: Vec::new(), others: Vec::new() };
     for row in reader.records() {
         let row: Vec<String> = row.map_err(|error| error.to_string())?.iter().map(String::from).collect();
-        let planned = cells.get(&row[..keys]).zip(row[keys].parse::<u32>().ok()).filter(|(cell, repeat)| {
-            *repeat < plan.repeats && row[keys + 1] == plan.seed(**cell, *repeat).to_string()
-        });
+        let planned = cells
+            .get(&row[..keys])
+            .zip(row[keys].parse::<u32>().ok())
+            .filter(|(cell, repeat)| *repeat < plan.repeats && row[keys + 1] == plan.seed(**cell, *repeat).to_string());
         let Some((&cell, repeat)) = planned else {
             let values = plan.settings.iter().zip(&row).map(|(setting, value)| format!("{}={value}", setting.key));
             let values: Vec<String> = values.collect();

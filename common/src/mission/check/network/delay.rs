@@ -42,7 +42,11 @@ pub(super) fn check(faults: &mut Collector<'_>, key: &str, delay: &DelayChoice) 
                 let allowed = "between 1/1000 and 10 times mean_s - min_s";
                 faults.fault(&format!("{key}.deviation_s"), d.deviation_s, allowed);
             }
-            if ok && fits && check_tail(faults, &key, d) { Delay::gamma(d.mean_s, d.deviation_s, d.min_s) } else { Delay::default() }
+            if ok && fits && check_tail(faults, &key, d) {
+                Delay::gamma(d.mean_s, d.deviation_s, d.min_s)
+            } else {
+                Delay::default()
+            }
         }
         DelayChoice::Distance(d) => {
             let key = format!("{key}.distance");
