@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_run_comes_within_a_tenth_of_the_window_and_never_beyond() {
+    fn a_long_run_comes_within_a_twentieth_of_the_window_and_never_beyond() {
         for (n, window, dwell) in [(2, 10.0, 1.0), (3, 12.0, 0.3), (3, 20.0, 1.0), (5, 40.0, 1.0), (5, 40.0, 3.0)] {
             let window = Span::from_secs(window);
             for seed in 0..20 {
@@ -184,7 +184,7 @@ mod tests {
                 let signal = Switching::in_mean(n, &arcs, groups, window, Span::from_secs(dwell), stream);
                 let run = Connectivity::planned(signal.expect("possible"), n, &arcs, Time::ZERO + window * 200);
                 let share = run.connected_in_mean().expect("connected in mean").secs() / window.secs();
-                assert!((0.9..=1.0).contains(&share), "{n} vehicles, {window}, seed {seed}: {share} of the window");
+                assert!((0.95..=1.0).contains(&share), "{n} vehicles, {window}, seed {seed}: {share} of the window");
             }
         }
     }
