@@ -523,4 +523,18 @@ fn the_bound_of_talk_by_event_holds_for_kinematic_vehicles_along_their_lines() {
     assert_broken(&with(&text, "x_m = 4.0, y_m = 0.0 }", "x_m = 4.0, y_m = 0.5 }"), NAME, "does not move just as told");
     let lossy = with(&text, "[network]", "[network]\nloss = { bernoulli = { probability = 0.1 } }");
     assert_broken(&lossy, NAME, "messages are lost");
+    // Three in a row: λ_max g + d = 3√6 + 2, news 0.15 s old as above.
+    let eager = with(&text, "gain = 0.1", "gain = 1.0");
+    assert_broken(
+        &eager,
+        NAME,
+        "a gain too large for news that are σ = 0.150 s old: σk(λ_max g + d) = 1.402, not below 1",
+    );
+    let one_way =
+        with(&text, "links = [[\"a\", \"b\"], [\"b\", \"c\"]]", "links = [[\"a\", \"b\"]]\none_way = [[\"b\", \"c\"]]");
+    assert_broken(&one_way, NAME, "; 1 of 3 directed links without the other direction");
+    let own = with(&text, "id = \"c\"", "id = \"c\"\ngains = { gain = 0.2 }");
+    assert_broken(&own, NAME, "; unequal gains, 0.1 to 0.2");
+    let slow = with(&text, "[network]", "[network]\ndelay = { gamma = { mean_s = 0.2, deviation_s = 0.1 } }");
+    assert_broken(&slow, NAME, "; delays have no bound");
 }

@@ -37,12 +37,18 @@ pub fn gain(graph: &Graph) -> Option<f64> {
     Some((n as f64 * squares.last()?.max(0.0)).sqrt() / lambda_2)
 }
 
+/// σk(λ_max g + d): how much of a wrong belief comes back as another one while news of it are on their way; below 1 there is
+/// a bound. `None` as [`gain`].
+pub fn loop_gain(graph: &Graph, k: f64, staleness: f64) -> Option<f64> {
+    let lambda_max = symmetric_eigenvalues(&graph.laplacian()).last().copied()?;
+    let degree = (0..graph.len()).map(|i| graph.degree(i)).max()? as f64;
+    Some(staleness * k * (lambda_max * gain(graph)? + degree))
+}
+
 /// The largest error of any belief in the end \[units of ξ\]; `None` if there is no bound: one-way links, a graph that is
 /// not connected, or news too stale for this gain.
 pub fn belief_error(graph: &Graph, k: f64, threshold: f64, staleness: f64) -> Option<f64> {
-    let lambda_max = symmetric_eigenvalues(&graph.laplacian()).last().copied()?;
-    let degree = (0..graph.len()).map(|i| graph.degree(i)).max()? as f64;
-    let room = 1.0 - staleness * k * (lambda_max * gain(graph)? + degree);
+    let room = 1.0 - loop_gain(graph, k, staleness)?;
     (room > 0.0).then(|| threshold / room)
 }
 
@@ -53,7 +59,7 @@ pub fn ultimate_bound(graph: &Graph, k: f64, threshold: f64, staleness: f64) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::{belief_error, gain, ultimate_bound};
+    use super::{belief_error, gain, loop_gain, ultimate_bound};
     use crate::graph::Graph;
     use proptest::prelude::*;
 
@@ -90,6 +96,8 @@ mod tests {
         assert_eq!(gain(&Graph::from_arcs(2, &[(0, 1)])), None);
         assert_eq!(gain(&Graph::empty(3)), None);
         assert_eq!(ultimate_bound(&pair(), 1.0, 0.1, 10.0), None, "too stale");
+        // A pair: λ_max g = √2, d = 1.
+        assert!((loop_gain(&pair(), 1.0, 10.0).expect("connected") - 10.0 * (2f64.sqrt() + 1.0)).abs() < 1e-9);
     }
 
     #[test]

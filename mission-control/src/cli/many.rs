@@ -9,6 +9,7 @@ use super::mission::load;
 use super::{End, Ended, quoted};
 use crate::console::Count;
 use crate::gallery::{GALLERY, Gallery};
+use crate::sweep::Broken;
 use crate::sweep::measure::index_of;
 use crate::sweep::plan::Plan;
 use crate::sweep::setting::Setting;
@@ -30,7 +31,7 @@ pub(super) fn sweep(path: &Path, sets: &[String], repeat: u32, measure: &str, ou
         !stop.is_raised()
     });
     progress.done();
-    let swept = swept.map_err(|reason| End(4, reason))?;
+    let swept = swept.map_err(broken)?;
     if !swept.complete {
         return Err(interrupted(&out));
     }
@@ -59,11 +60,15 @@ pub(super) fn study(path: &Path, out: Option<PathBuf>) -> Ended {
         !stop.is_raised()
     });
     progress.done();
-    if !complete.map_err(|reason| End(4, reason))? {
+    if !complete.map_err(broken)? {
         return Err(interrupted(&out));
     }
     bus::tell!("{} runs: {}", study.runs(), out.join("README.md").display());
     Ok(ExitCode::SUCCESS)
+}
+
+fn broken(broken: Broken) -> End {
+    End(broken.exit_code(), broken.to_string())
 }
 
 fn interrupted(out: &Path) -> End {

@@ -79,13 +79,14 @@ enum What {
     },
     /// Fly a mission with every combination of some values, each several times, and sum up what came of it
     #[command(
-        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 5\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, 4 files cannot be read or written."
+        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 5\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, or a folder with runs that this sweep would lose,\n  4 files cannot be read or written."
     )]
     Sweep {
         /// The mission file
         mission: PathBuf,
         /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated. For short:
-        /// network.loss, network.delay, and coordination.GAIN for a gain of the mission's law
+        /// network.loss and network.delay for independent losses and a constant delay in place of the mission's models, and
+        /// coordination.GAIN for a gain of the mission's law
         #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
         sets: Vec<String>,
         /// Runs of every combination, each with a seed of its own
@@ -94,7 +95,7 @@ enum What {
         /// The number that is drawn; a column of runs.csv
         #[arg(long, value_name = "COLUMN", default_value = "coordination_last")]
         measure: String,
-        /// The sweep's folder; the same command goes on with what is there (default: runs/sweep-MISSION)
+        /// The sweep's folder; the same command, or one of a larger sweep, goes on with what is there (default: runs/sweep-MISSION)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },

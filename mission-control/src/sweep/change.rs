@@ -2,6 +2,9 @@
 
 use toml::{Table, Value};
 
+/// Keys that say all there is to say of a model: it takes the place of whatever model the mission has there.
+const WHOLE_MODELS: [&str; 2] = ["network.loss.bernoulli.probability", "network.delay.constant.delay_s"];
+
 /// The text of a mission file with some of its keys set to other values. Whether the keys exist, and whether the mission can
 /// be flown with them, is for the mission's own check to say.
 ///
@@ -12,6 +15,12 @@ pub fn changed(text: &str, changes: &[(&str, &Value)]) -> Result<String, String>
     for (key, value) in changes {
         let mut steps: Vec<&str> = key.split('.').collect();
         let last = steps.pop().unwrap_or(key);
+        if WHOLE_MODELS.contains(key)
+            && let [section, model, _] = steps[..]
+            && let Some(section) = root.get_mut(section).and_then(Value::as_table_mut)
+        {
+            section.remove(model);
+        }
         let mut here = &mut root;
         for (depth, step) in steps.iter().enumerate() {
             here = below(here, step).ok_or_else(|| {
@@ -30,6 +39,18 @@ pub fn changed(text: &str, changes: &[(&str, &Value)]) -> Result<String, String>
         }
     }
     Ok(root.to_string())
+}
+
+/// The only name in the table of a mission file at a key, if it has but one: of a choice, what is chosen.
+pub(super) fn chosen(text: &str, key: &str) -> Option<String> {
+    let root: Table = text.parse().ok()?;
+    let step = |here: &Table, step: &str| match index(step) {
+        Some((name, at)) => here.get(name)?.as_array()?.get(at)?.as_table().cloned(),
+        None => here.get(step)?.as_table().cloned(),
+    };
+    let table = key.split('.').try_fold(root, |here, name| step(&here, name))?;
+    let mut names = table.keys();
+    names.next().filter(|_| names.next().is_none()).cloned()
 }
 
 /// The table below a table at `name` or `name[index]`. One that is not there yet is made: keys with a default need not be in
@@ -79,6 +100,27 @@ mod tests {
         assert!(with("coordination.validity_s", 1.5).expect("sound").validity.is_some());
         let bare = changed(MISSION, &[("network.loss", &Value::from("none"))]).expect("changed");
         assert!(changed(&bare, &[("network.loss.bernoulli.probability", &Value::from(0.5))]).is_ok());
+    }
+
+    #[test]
+    fn a_loss_or_a_delay_in_one_number_takes_the_place_of_any_model() {
+        let bursts = format!("{MISSION}\n").replace(
+            "[network]\n",
+            "[network]\nloss = { gilbert_elliott = { mean_burst = 3.0, mean_gap = 9.0 } }\ndelay = { jittered = { min_s = 1.0, max_s = 2.0 } }\n",
+        );
+        assert!(bursts.contains("jittered"), "{bursts}");
+        let (loss, delay) = (Value::from(0.25), Value::from(0.5));
+        let changes = [("network.loss.bernoulli.probability", &loss), ("network.delay.constant.delay_s", &delay)];
+        let text = changed(&bursts, &changes).expect("changed");
+        let mission = Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}"));
+        assert_eq!(mission.links[0].fixed_delay().map(|delay| delay.secs()), Some(0.5));
+        assert!(format!("{:?}", mission.links[0].layers[0].loss).contains("Bernoulli(0.25)"), "{:?}", mission.links[0]);
+    }
+
+    #[test]
+    fn what_a_mission_chose_is_the_one_name_there() {
+        assert_eq!(chosen(MISSION, "coordination.law").as_deref(), Some("introduction"));
+        assert_eq!((chosen(MISSION, "network"), chosen(MISSION, "vehicles[0].path.nothing")), (None, None));
     }
 
     #[test]

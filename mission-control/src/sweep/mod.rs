@@ -26,6 +26,7 @@ pub mod setting;
 pub mod store;
 pub mod study;
 
+use std::fmt;
 use std::path::Path;
 
 use self::cells::{CellStatistics, statistics};
@@ -48,12 +49,45 @@ pub struct Swept {
     pub cells: Vec<CellStatistics>,
 }
 
+/// Why a sweep did not come to its end.
+#[derive(Debug)]
+pub enum Broken {
+    /// The folder holds what this sweep would not keep; the command is at fault.
+    Refused(String),
+    /// A file cannot be read or written.
+    File(String),
+}
+
+impl Broken {
+    /// What the program ends with.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Broken::Refused(_) => 2,
+            Broken::File(_) => 4,
+        }
+    }
+}
+
+impl From<String> for Broken {
+    fn from(reason: String) -> Broken {
+        Broken::File(reason)
+    }
+}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Broken::Refused(reason) | Broken::File(reason) => f.write_str(reason),
+        }
+    }
+}
+
 /// Flies the runs of a plan that a folder does not have yet, on all cores, and writes the tables. `over` is told of every
 /// run that is over; once it returns false, no further run is begun.
 ///
 /// # Errors
-/// What cannot be read or written.
-pub fn sweep(plan: &Plan, out: &Path, mut over: impl FnMut(usize, usize) -> bool) -> Result<Swept, String> {
+/// What cannot be read or written, or what the folder holds that the plan does not have: nothing that was flown is lost.
+pub fn sweep(plan: &Plan, out: &Path, mut over: impl FnMut(usize, usize) -> bool) -> Result<Swept, Broken> {
     let (mut store, mut runs) = Store::open(out, plan)?;
     let found = runs.len();
     let total = plan.cells.len() * plan.repeats as usize;
@@ -78,7 +112,7 @@ pub fn sweep(plan: &Plan, out: &Path, mut over: impl FnMut(usize, usize) -> bool
         );
     }
     if let Some(reason) = broken {
-        return Err(reason);
+        return Err(reason.into());
     }
     runs.sort_by_key(|run| place(run.cell, run.repeat));
     let complete = runs.len() == total;
@@ -211,7 +245,7 @@ mod tests {
         let table = runs_csv(&out);
         fs::remove_file(out.join("sweep.json")).expect("there");
         let refused = sweep(&plan, &out, |_, _| true).expect_err("whose is it?");
-        assert!(refused.contains("is not overwritten"), "{refused}");
+        assert!(refused.to_string().contains("runs.csv with 2 runs, and no sweep.json"), "{refused}");
         assert_eq!(runs_csv(&out), table);
     }
 
@@ -221,7 +255,28 @@ mod tests {
         sweep(&plan("network.loss=0,0.5", 2), &out, |_, _| true).expect("swept");
         let larger = sweep(&plan("network.loss=0,0.25,0.5", 2), &out, |_, _| true).expect("swept");
         assert_eq!((larger.found, larger.runs.len()), (4, 6));
-        let reason = sweep(&plan("network.delay=0,1", 2), &out, |_, _| true).expect_err("refused");
-        assert!(reason.contains("holds a sweep of another mission"), "{reason}");
+        let broken = sweep(&plan("network.delay=0,1", 2), &out, |_, _| true).expect_err("refused");
+        assert!(broken.to_string().contains("holds a sweep of another mission"), "{broken}");
+        assert_eq!(broken.exit_code(), 2);
+    }
+
+    #[test]
+    fn a_sweep_that_would_lose_runs_is_refused_and_they_stay() {
+        let (_folder, out) = temporary();
+        sweep(&plan("network.loss=0:0.5:0.25", 3), &out, |_, _| true).expect("swept");
+        let before = runs_csv(&out);
+        for (losses, repeats, lost, first) in [
+            ("network.loss=0,0.5", 3, 3, "network.loss.bernoulli.probability=0.25 repeat 0"),
+            ("network.loss=0:0.5:0.25", 2, 3, "network.loss.bernoulli.probability=0 repeat 2"),
+            ("network.loss=0,0.1", 2, 7, "network.loss.bernoulli.probability=0 repeat 2"),
+        ] {
+            let broken = sweep(&plan(losses, repeats), &out, |_, _| true).expect_err("refused");
+            let expected = format!("found 9 runs, of which this sweep does not have {lost} (the first: {first})");
+            let reason = broken.to_string();
+            assert!(reason.contains(&expected) && reason.contains("or a larger one"), "{expected} is not in {reason}");
+            assert_eq!((broken.exit_code(), runs_csv(&out)), (2, before.clone()));
+        }
+        let larger = sweep(&plan("network.loss=0.5,0.25,0,0.75", 4), &out, |_, _| true).expect("swept");
+        assert_eq!((larger.found, larger.runs.len()), (9, 16));
     }
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use common::mission::{Mission, digest};
+use common::mission::{Fault, Mission, digest};
 use toml::Value;
 
-use super::change::changed;
+use super::change::{changed, chosen};
 use super::setting::{Setting, option, shown};
 
 /// Most runs of a sweep.
@@ -49,11 +49,6 @@ impl Plan {
             let why = "every run has a seed of its own, made from the mission's; for several of them say --repeat";
             return Err(format!("--set {}: found in a sweep; allowed: other keys ({why})", setting.key));
         }
-        for Setting { key, values } in &settings {
-            if let Some(twice) = values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)) {
-                return Err(format!("--set {key}: found {} twice; allowed: every value once", shown(twice.1)));
-            }
-        }
         let count =
             settings.iter().try_fold(repeats as usize, |count, setting| count.checked_mul(setting.values.len()));
         if !count.is_some_and(|count| (1..=MOST_RUNS).contains(&count)) {
@@ -95,7 +90,7 @@ impl Plan {
     /// What is wrong with it; the plan has been checked, so nothing.
     pub fn mission(&self, cell: usize, repeat: u32) -> Result<Arc<Mission>, String> {
         let seed = Value::Integer(self.seed(cell, repeat).cast_signed());
-        parse(&changed(&self.cells[cell].text, &[("seed", &seed)])?).map(Arc::new)
+        parse(&changed(&self.cells[cell].text, &[("seed", &seed)])?, |_| None).map(Arc::new)
     }
 
     /// The command that flies a run again.
@@ -116,15 +111,34 @@ pub fn apply(text: &str, changes: &[(&str, &Value)]) -> Result<String, String> {
         let options: Vec<String> = changes.iter().map(|(key, value)| option(key, value)).collect();
         format!("with {}: {reason}", options.join(" "))
     };
-    let text = changed(text, changes).map_err(of_cell)?;
-    parse(&text).map_err(of_cell)?;
-    Ok(text)
+    let after = changed(text, changes).map_err(of_cell)?;
+    parse(&after, |fault| second_model(text, changes, fault)).map_err(of_cell)?;
+    Ok(after)
 }
 
-/// The faults of a changed mission are told without lines: no file has them.
-fn parse(text: &str) -> Result<Mission, String> {
-    Mission::parse("", text)
-        .map_err(|faults| faults.list.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+/// The faults of a changed mission are told without lines: no file has them. `known` tells some in better words.
+fn parse(text: &str, known: impl Fn(&Fault) -> Option<String>) -> Result<Mission, String> {
+    let told = |fault: &Fault| known(fault).unwrap_or_else(|| fault.to_string());
+    Mission::parse("", text).map_err(|faults| faults.list.iter().map(told).collect::<Vec<_>>().join("; "))
+}
+
+/// What is wrong with a key of a model beside which the mission already has another one, and what to do.
+fn second_model(text: &str, changes: &[(&str, &Value)], fault: &Fault) -> Option<String> {
+    let place = fault.key.as_str();
+    // What is said of a choice with two names.
+    if !fault.allowed.starts_with("one of ") {
+        return None;
+    }
+    let (rest, value) =
+        changes.iter().find_map(|(key, value)| Some((key.strip_prefix(place)?.strip_prefix('.')?, *value)))?;
+    let (model, _) = rest.split_once('.')?;
+    let there = chosen(text, place).filter(|there| there != model)?;
+    // As one value of its own, for the whole place.
+    let whole = format!("{place}={{ {rest} = {value} }}");
+    Some(format!(
+        "{place}: found {there} in the mission, so there is no {model} with keys to set; allowed: keys of {place}.{there}, or \
+         another model as a whole, with all keys that it needs, say --set '{whole}'"
+    ))
 }
 
 #[cfg(test)]
@@ -135,7 +149,7 @@ mod tests {
 
     fn plan(sets: &[&str], repeats: u32) -> Result<Plan, String> {
         let settings = sets.iter().map(|text| Setting::parse(text)).collect::<Result<_, _>>()?;
-        Plan::new("m.toml", Arc::new(parse(MISSION)?), settings, repeats)
+        Plan::new("m.toml", Arc::new(parse(MISSION, |_| None)?), settings, repeats)
     }
 
     #[test]
@@ -178,8 +192,13 @@ mod tests {
                 "with --set network.loss.bernoulli.probability=1.5: network.loss.bernoulli.probability: found 1.5; allowed: ",
             ),
             (&["coordination.b0=1"][..], "coordination.b0: found an unknown key; allowed: "),
+            (
+                &["coordination.law.switching.gain=1,2"][..],
+                "with --set coordination.law.switching.gain=1: coordination.law: found introduction in the mission, so there is no \
+                 switching with keys to set; allowed: keys of coordination.law.introduction, or another model as a whole, with all \
+                 keys that it needs, say --set 'coordination.law={ switching.gain = 1 }'",
+            ),
             (&["duration_s=1", "duration_s=2"][..], "--set duration_s: found twice"),
-            (&["duration_s=1,2,1.0,1"][..], "--set duration_s: found 1 twice; allowed: every value once"),
             (&["seed=1,2"][..], "--set seed: found in a sweep; allowed: other keys"),
             (&["duration_s=1:10000:1", "network.loss=0:0.999:0.001"][..], "found 10000000 runs"),
         ] {

@@ -1,5 +1,7 @@
 //! What `--set` says: a key of the mission file and the values it is to have.
 
+use std::collections::HashSet;
+
 use toml::Value;
 
 /// Most values of one key.
@@ -32,8 +34,14 @@ impl Setting {
             Some(found) => found.map_err(|allowed| refused(&format!("the range {values}"), allowed))?,
             None => listed(values).into_iter().map(value).collect(),
         };
+        let values: Vec<Value> = values.into_iter().map(plain).collect();
         if values.is_empty() || values.len() > MOST_VALUES {
             return Err(refused(&format!("{} values", values.len()), &format!("1 to {MOST_VALUES}")));
+        }
+        let mut known = HashSet::new();
+        if let Some(twice) = values.iter().map(shown).find(|value| !known.insert(value.clone())) {
+            let allowed = "each value once; --repeat flies it several times";
+            return Err(refused(&format!("{twice} twice"), allowed));
         }
         Ok(Setting { key: full_key(key, &values), values })
     }
@@ -107,6 +115,17 @@ fn listed(text: &str) -> Vec<&str> {
     parts
 }
 
+/// A whole number without a decimal point: 0, 0.0 and the first of 0:1:0.1 are the same value, of the same cell with the same
+/// seeds, and a key that takes whole numbers only can have a range.
+fn plain(value: Value) -> Value {
+    // Up to here every whole number is one of these.
+    const MOST: f64 = 9e15;
+    match value {
+        Value::Float(number) if number.fract() == 0.0 && number.abs() <= MOST => Value::Integer(number as i64),
+        other => other,
+    }
+}
+
 /// A value as in TOML; what is none there is text.
 fn value(text: &str) -> Value {
     let text = text.trim();
@@ -139,9 +158,9 @@ mod tests {
 
     #[test]
     fn a_range_has_both_ends_and_no_rounding_errors() {
-        assert_eq!(shown_values("a=0:0.9:0.1").join(" "), "0.0 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9");
-        assert_eq!(shown_values("a=5:-5:-5"), ["5.0", "0.0", "-5.0"]);
-        assert_eq!(shown_values("a=1:1:1"), ["1.0"]);
+        assert_eq!(shown_values("a=0:0.9:0.1").join(" "), "0 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9");
+        assert_eq!(shown_values("a=5:-5:-5"), ["5", "0", "-5"]);
+        assert_eq!(shown_values("a=1:1:1"), ["1"]);
     }
 
     #[test]
@@ -180,6 +199,9 @@ mod tests {
             ("a=0:1:-0.1", "the range"),
             ("a=0:1:1e-9", "at most 10000"),
             ("a=0:inf:1", "the range"),
+            ("a=0.1,0.1", "found 0.1 twice; allowed: each value once"),
+            ("a=0,0.5,0.0", "found 0 twice"),
+            ("a=none,0,none", "found none twice"),
         ] {
             let found = Setting::parse(text).expect_err(text);
             assert!(found.contains(reason) && found.contains("allowed: "), "{found}");

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::Broken;
 use super::measure::MEASURES;
 use super::plan::Plan;
 use super::setting::shown;
@@ -52,8 +53,9 @@ impl Store {
     /// Opens the table in a folder, with the runs of the plan that are there already.
     ///
     /// # Errors
-    /// What cannot be read or written, or that the folder holds another sweep.
-    pub fn open(folder: &Path, plan: &Plan) -> Result<(Store, Vec<Run>), String> {
+    /// What cannot be read or written, or that the folder holds another sweep, or runs that the plan does not have. Then it
+    /// is left as it is.
+    pub fn open(folder: &Path, plan: &Plan) -> Result<(Store, Vec<Run>), Broken> {
         fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
         let head = Head {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -68,11 +70,15 @@ impl Store {
                 let found: Head = serde_json::from_str(&text).map_err(|error| format!("{HEAD}: {error}"))?;
                 if found != head {
                     let reason = "of another mission, other keys or another version; give another folder with --out";
-                    return Err(format!("{} holds a sweep {reason}", folder.display()));
+                    return Err(Broken::Refused(format!("{} holds a sweep {reason}", folder.display())));
                 }
                 let text = fs::read_to_string(&path).map_err(failed)?;
                 // A run that was cut off while it was written is flown again.
                 let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+                let held = read(whole, plan).map_err(|reason| format!("{}: {reason}", path.display()))?;
+                if let Some(first) = held.others.first() {
+                    return Err(Broken::Refused(held.refusal(folder, first)));
+                }
                 if whole.len() < text.len() {
                     OpenOptions::new()
                         .write(true)
@@ -80,16 +86,17 @@ impl Store {
                         .and_then(|f| f.set_len(whole.len() as u64))
                         .map_err(failed)?;
                 }
-                read(whole, plan).map_err(|reason| format!("{}: {reason}", path.display()))?
+                held.runs
             }
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                return Err(format!("cannot read {}: {error}", folder.join(HEAD).display()));
-            }
-            Err(_) => {
-                if fs::read(&path).is_ok_and(|table| table.iter().filter(|byte| **byte == b'\n').count() > 1) {
-                    let reason =
-                        format!("has no {HEAD} beside it and is not overwritten: give another folder with --out");
-                    return Err(format!("{} {reason}", path.display()));
+            Err(error) => {
+                if error.kind() != ErrorKind::NotFound {
+                    return Err(format!("cannot read {}: {error}", folder.join(HEAD).display()).into());
+                }
+                let rows = fs::read_to_string(&path).map_or(0, |text| text.lines().skip(1).count());
+                if rows > 0 {
+                    let found =
+                        format!("{} with {rows} runs, and no {HEAD} that says of which mission", path.display());
+                    return Err(Broken::Refused(format!("found {found}; allowed: another folder with --out")));
                 }
                 write(&path, line(&columns(plan)).as_bytes())?;
                 write(&folder.join(HEAD), &serde_json::to_vec_pretty(&head).unwrap_or_default())?;
@@ -144,9 +151,30 @@ fn line(fields: &[String]) -> String {
     String::from_utf8(bytes.unwrap_or_default()).unwrap_or_default()
 }
 
-/// The runs of the plan in a table, each once: two sweeps at a time may have flown the same. Others, of a sweep that was
-/// larger, are left out, and so are those with a number that cannot be read: they are flown again.
-fn read(text: &str, plan: &Plan) -> Result<Vec<Run>, String> {
+/// What a table holds.
+struct Held {
+    /// The runs of the plan.
+    runs: Vec<Run>,
+    /// Other runs, of a sweep that was larger or had other values: which, in words.
+    others: Vec<String>,
+}
+
+impl Held {
+    /// Why a plan that lacks runs is not flown into their folder.
+    fn refusal(&self, folder: &Path, first: &str) -> String {
+        let (others, all) = (self.others.len(), self.others.len() + self.runs.len());
+        format!(
+            "{}: found {all} runs, of which this sweep does not have {others} (the first: {first}), so that they would be lost; \
+             allowed: the same sweep here, or a larger one with all values and repeats of the runs that are here; or another \
+             folder with --out",
+            folder.display()
+        )
+    }
+}
+
+/// The runs of a table, each once: two sweeps at a time may have flown the same. Those with a number that cannot be read are left out and
+/// flown again.
+fn read(text: &str, plan: &Plan) -> Result<Held, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let expected = columns(plan);
     let header = reader.headers().map_err(|error| error.to_string())?;
@@ -165,16 +193,22 @@ fn read(text: &str, plan: &Plan) -> Result<Vec<Run>, String> {
         _ => field.parse::<f64>().ok().filter(|value| value.is_finite()).map(Some),
     };
     let mut there = HashSet::new();
-    let mut runs = Vec::new();
+    let mut held = Held { runs: Vec::new(), others: Vec::new() };
     for row in reader.records() {
         let row: Vec<String> = row.map_err(|error| error.to_string())?.iter().map(String::from).collect();
-        let (Some(&cell), Ok(repeat)) = (cells.get(&row[..keys]), row[keys].parse::<u32>()) else { continue };
-        if repeat >= plan.repeats || row[keys + 1] != plan.seed(cell, repeat).to_string() {
+        let planned = cells
+            .get(&row[..keys])
+            .zip(row[keys].parse::<u32>().ok())
+            .filter(|(cell, repeat)| *repeat < plan.repeats && row[keys + 1] == plan.seed(**cell, *repeat).to_string());
+        let Some((&cell, repeat)) = planned else {
+            let values = plan.settings.iter().zip(&row).map(|(setting, value)| format!("{}={value}", setting.key));
+            let values: Vec<String> = values.collect();
+            held.others.push(format!("{} repeat {}", values.join(" "), row[keys]));
             continue;
-        }
+        };
         let numbers: Option<Vec<Option<f64>>> = row[keys + 3..].iter().map(|field| number(field)).collect();
         let Some(numbers) = numbers.filter(|_| there.insert((cell, repeat))) else { continue };
-        runs.push(Run { cell, repeat, outcome: row[keys + 2].clone(), numbers });
+        held.runs.push(Run { cell, repeat, outcome: row[keys + 2].clone(), numbers });
     }
-    Ok(runs)
+    Ok(held)
 }

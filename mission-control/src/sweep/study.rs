@@ -10,7 +10,7 @@ use serde::Deserialize;
 use super::measure::{MEASURES, index_of};
 use super::plan::Plan;
 use super::setting::Setting;
-use super::{Swept, finding, page, picture, sweep};
+use super::{Broken, Swept, finding, page, picture, sweep};
 use crate::folder::{load, write};
 
 /// A study as written.
@@ -86,8 +86,8 @@ impl Study {
     /// once it returns false, no further run is begun. Whether all runs are over is returned.
     ///
     /// # Errors
-    /// What cannot be read or written.
-    pub fn make(&self, out: &Path, command: &str, mut over: impl FnMut(usize, usize) -> bool) -> Result<bool, String> {
+    /// What cannot be read or written, or what the folder holds that the study does not have.
+    pub fn make(&self, out: &Path, command: &str, mut over: impl FnMut(usize, usize) -> bool) -> Result<bool, Broken> {
         let total = self.runs();
         let mut before = 0;
         let mut all: Vec<Swept> = Vec::new();

@@ -170,20 +170,35 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
     // The bound is of equal gains.
     let gain = mission.has_equal_gains().then_some(law.gain);
     let used = mission.control_period * (mission.message_ticks + 1) + trigger.least_silence();
-    let bound = greatest_delay(mission).zip(gain).and_then(|(slowest, gain)| {
-        event_triggered::ultimate_bound(&network.graph, gain, trigger.floor(), (used + slowest).secs())
-    });
-    let lacks = [
+    let oldest = greatest_delay(mission).map(|slowest| (used + slowest).secs());
+    let of_beliefs = oldest.zip(gain);
+    let bound = of_beliefs
+        .and_then(|(oldest, gain)| event_triggered::ultimate_bound(&network.graph, gain, trigger.floor(), oldest));
+    let loop_gain =
+        of_beliefs.and_then(|(oldest, gain)| Some((oldest, event_triggered::loop_gain(&network.graph, gain, oldest)?)));
+    let premises = [
         (network.graphs.len() == 1, "the network changes"),
         (mission.loses_by_switching_only(), "messages are lost"),
         (mission.between == Between::Advance, "beliefs do not move on at v_L"),
         (goes_as_told(case), NOT_AS_TOLD),
-        (bound.is_some(), "one-way links, not connected, unequal gains, or a gain too large for how old news are"),
     ];
-    let lacks: String = lacks.iter().filter(|(met, _)| !met).map(|(_, lack)| format!("; {lack}")).collect();
+    let premises = premises.iter().filter(|(met, _)| !met).map(|(_, lack)| (*lack).to_string());
+    let of_bound = [
+        one_way_links(&network.graph),
+        (network.graph.is_undirected() && !network.graph.is_connected()).then(|| "not connected: λ_2 = 0".into()),
+        gain.is_none().then(|| unequal_gains(mission)),
+        oldest.is_none().then(|| "delays have no bound".into()),
+        loop_gain.filter(|(_, share)| *share >= 1.0).map(|(oldest, share)| {
+            format!(
+                "a gain too large for news that are σ = {oldest:.3} s old: σk(λ_max g + d) = {share:.3}, not below 1"
+            )
+        }),
+    ];
+    let lacks: String = premises.chain(of_bound.into_iter().flatten()).map(|lack| format!("; {lack}")).collect();
     Some(TheoryRow {
         name: "Coordination error left by event-triggered talk".into(),
-        condition: "fixed two-way connected network, nothing lost, advance, a small gain, type II or a kinematic vehicle along its line"
+        condition: "fixed two-way connected network, bounded delays, nothing lost, advance, equal gains with σk(λ_max g + d) < 1, type II or a \
+                    kinematic vehicle along its line"
             .into(),
         value: format!("threshold {} in the end{lacks}", trigger.floor()),
         holds: Some(lacks.is_empty()),
@@ -193,6 +208,19 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
         measured: case.measured(|s| format!("{:.4} in the steady part", s.fleet.coordination.steady_rms)),
         ..TheoryRow::default()
     })
+}
+
+/// How many links go one way only, if any does.
+fn one_way_links(graph: &Graph) -> Option<String> {
+    let all = graph.arcs().count();
+    let alone = graph.arcs().filter(|&(receiver, sender)| !graph.hears(sender, receiver)).count();
+    (alone > 0).then(|| format!("{alone} of {all} directed links without the other direction"))
+}
+
+fn unequal_gains(mission: &Mission) -> String {
+    let gains = mission.gains("gain");
+    let (least, most) = gains.iter().fold((f64::INFINITY, 0.0f64), |(a, b), gain| (a.min(*gain), b.max(*gain)));
+    format!("unequal gains, {least} to {most}")
 }
 
 /// The delay that all messages on all links have, if they have.

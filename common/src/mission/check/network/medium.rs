@@ -12,6 +12,9 @@ use crate::wire::state::STATE_LIMIT;
 /// The least that says what a coordination message says \[bytes\]: sender, number, ξ and a checksum.
 const LEAST_PACKET: u32 = 17;
 
+/// Fastest rate \[bit/s\]; it stands in for one that is missing, as with it no message is too long for its slot.
+const FASTEST_RATE: f64 = 1e12;
+
 /// The medium of a mission, if it has one.
 pub(in super::super) fn check_medium(
     faults: &mut Collector<'_>,
@@ -22,8 +25,13 @@ pub(in super::super) fn check_medium(
     let section = network.medium.as_ref()?;
     let key = "network.medium";
     let within = |value: f64| (0.0..=3600.0).contains(&value);
-    let rate_ok = (1.0..=1e12).contains(&section.rate_bps);
-    faults.number(&format!("{key}.rate_bps"), section.rate_bps, rate_ok, "1 to 1e12 bit/s");
+    let rate = section.rate_bps.unwrap_or_else(|| {
+        let allowed = "a number: bits that a sender puts on the air per second, or a preset that has a medium";
+        faults.fault(key, "no rate_bps", allowed);
+        FASTEST_RATE
+    });
+    let rate_ok = (1.0..=FASTEST_RATE).contains(&rate);
+    faults.number(&format!("{key}.rate_bps"), rate, rate_ok, "1 to 1e12 bit/s");
     if let Some(bytes) = section.packet_bytes.filter(|bytes| !(LEAST_PACKET..=65_535).contains(bytes)) {
         let allowed = format!(
             "{LEAST_PACKET} to 65535 bytes: a modem that packs tightly still sends the sender (1), the number (4), ξ (8) \
@@ -31,28 +39,31 @@ pub(in super::super) fn check_medium(
         );
         faults.fault(&format!("{key}.packet_bytes"), bytes, allowed);
     }
-    faults.number(&format!("{key}.preamble_s"), section.preamble_s, within(section.preamble_s), "0 to 3600 s");
-    faults.number(&format!("{key}.backoff_s"), section.backoff_s, within(section.backoff_s), "0 to 3600 s");
-    if !(1..=10_000).contains(&section.queue) {
-        faults.fault(&format!("{key}.queue"), section.queue, "1 to 10000 messages");
+    let (preamble, backoff) = (section.preamble_s.unwrap_or(0.0), section.backoff_s.unwrap_or(0.0));
+    faults.number(&format!("{key}.preamble_s"), preamble, within(preamble), "0 to 3600 s");
+    faults.number(&format!("{key}.backoff_s"), backoff, within(backoff), "0 to 3600 s");
+    let queue = section.queue.unwrap_or(1);
+    if !(1..=10_000).contains(&queue) {
+        faults.fault(&format!("{key}.queue"), queue, "1 to 10000 messages");
     }
     // Silence after a message is at most a hundred thousand times as long as the message.
-    let duty_ok = (1e-5..=1.0).contains(&section.duty_cycle);
-    faults.number(&format!("{key}.duty_cycle"), section.duty_cycle, duty_ok, "0.00001 to 1, a share of the time");
+    let duty_cycle = section.duty_cycle.unwrap_or(1.0);
+    let duty_ok = (1e-5..=1.0).contains(&duty_cycle);
+    faults.number(&format!("{key}.duty_cycle"), duty_cycle, duty_ok, "0.00001 to 1, a share of the time");
     let mut medium = Medium {
-        rate: section.rate_bps,
-        preamble: Span::from_secs(section.preamble_s),
+        rate,
+        preamble: Span::from_secs(preamble),
         packet: section.packet_bytes.map(|bytes| bytes as usize),
-        queue: section.queue as usize,
-        when_full: match section.when_full {
+        queue: queue as usize,
+        when_full: match section.when_full.unwrap_or_default() {
             WhenFullChoice::DropNew => WhenFull::DropNew,
             WhenFullChoice::DropOld => WhenFull::DropOld,
         },
-        backoff: Span::from_secs(section.backoff_s),
-        half_duplex: section.half_duplex,
-        collisions: section.collisions,
+        backoff: Span::from_secs(backoff),
+        half_duplex: section.half_duplex.unwrap_or(false),
+        collisions: section.collisions.unwrap_or(false),
         slots: None,
-        duty_cycle: section.duty_cycle,
+        duty_cycle,
     };
     // What fits a slot at its greatest always fits.
     let airtime = medium.airtime(STATE_LIMIT);

@@ -28,7 +28,10 @@ pub(super) fn with_preset(network: &NetworkSection) -> NetworkSection {
     network.range = network.range.or(preset.range);
     network.duplicate_probability = network.duplicate_probability.or(preset.duplicate_probability);
     network.corrupt_probability = network.corrupt_probability.or(preset.corrupt_probability);
-    network.medium = network.medium.or(preset.medium);
+    network.medium = match (network.medium, preset.medium) {
+        (Some(said), Some(known)) => Some(said.over(known)),
+        (said, known) => said.or(known),
+    };
     network
 }
 

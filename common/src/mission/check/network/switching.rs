@@ -193,7 +193,8 @@ fn check_in_mean(
     match Switching::in_mean(scope.vehicles, &arcs, pairs(scope.links), window, dwell, stream) {
         Ok(signal) => Some(signal),
         Err(Some(shortest)) => {
-            let allowed = format!("at least {} s: four dwells for each link that is needed", shortest.secs());
+            let allowed =
+                format!("at least {} s: four dwells for each link that is needed, less three", shortest.secs());
             faults.fault_of_links(&format!("{key}.window_s"), format!("{} s", choice.window_s), allowed);
             Some(Switching::always(arcs.len()))
         }

@@ -4,6 +4,7 @@ mod preset_sources;
 
 use super::super::super::Mission;
 use super::super::super::file::Preset;
+use crate::network::Medium;
 use crate::time::{Span, Time};
 
 const HELIX: &str = include_str!("../../../../../missions/auv-helix.toml");
@@ -39,6 +40,24 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "above min_s",
         ),
         ("delay = { gamma = { mean_s = 1.0, deviation_s = 100.0 } }", "delay.gamma.deviation_s", "100", "10 times"),
+        (
+            "delay = { normal = { mean_s = 1.0, deviation_s = 0.01, min_s = 3000.0 } }",
+            "delay.normal.mean_s",
+            "1",
+            "min_s to 3600 s",
+        ),
+        (
+            "delay = { normal = { mean_s = 600.0, deviation_s = 601.0 } }",
+            "delay.normal.deviation_s",
+            "601",
+            "at most 600: mean_s + 5 deviation_s",
+        ),
+        (
+            "delay = { gamma = { mean_s = 600.0, deviation_s = 3600.0 } }",
+            "delay.gamma.deviation_s",
+            "3600",
+            "at most 600: mean_s + 5 deviation_s",
+        ),
         ("delay = { distance = { speed_mps = 0.0 } }", "delay.distance.speed_mps", "0", "1 to 3e8 m/s"),
         (
             "loss = { gilbert_elliott = { mean_burst = 0.5, mean_gap = 5.0 } }",
@@ -87,10 +106,10 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "30 days",
         ),
         (
-            "switching = { connected_in_mean = { window_s = 7.9, dwell_s = 1.0 } }",
+            "switching = { connected_in_mean = { window_s = 4.9, dwell_s = 1.0 } }",
             "switching.connected_in_mean.window_s",
-            "7.9 s",
-            "at least 8 s",
+            "4.9 s",
+            "at least 5 s",
         ),
         (
             "switching = { trace = { links = [] } }",
@@ -162,6 +181,29 @@ fn a_mission_overrides_its_preset() {
     let medium = mission.medium.expect("the preset's");
     assert_eq!(medium.airtime(39), Span::from_secs(2.2), "17 bytes at 80 bit/s after 0.5 s");
     assert!(mission.links[0].range.is_limited() && mission.links[0].in_order);
+}
+
+#[test]
+fn keys_of_a_medium_are_laid_over_those_of_the_preset() {
+    let preset = mission("preset = \"acoustic_long_range\"").medium.expect("the preset's");
+    let medium = mission("preset = \"acoustic_long_range\"\nmedium = { packet_bytes = 32 }").medium.expect("laid over");
+    assert_eq!(medium.airtime(39), Span::from_secs(3.7), "32 bytes at 80 bit/s after 0.5 s");
+    assert_eq!(Medium { packet: preset.packet, ..medium }, preset);
+    let all = "preset = \"acoustic_short_range\"\nmedium = { rate_bps = 80.0, preamble_s = 0.0, queue = 2, when_full = \"drop_new\", \
+               backoff_s = 0.0, half_duplex = false, collisions = false, duty_cycle = 0.5 }";
+    let alone = all.replace("preset = \"acoustic_short_range\"\n", "");
+    assert_eq!(mission(all).medium, mission(&alone).medium);
+}
+
+#[test]
+fn a_rate_is_required_where_no_preset_has_it() {
+    for network in ["medium = { packet_bytes = 32, queue = 0 }", "preset = \"wifi_harbour\"\nmedium = { queue = 0 }"] {
+        let said = faults(network);
+        let line = HELIX[..HELIX.find("delay = { constant").expect("there")].lines().count() + network.lines().count();
+        let expected = format!("m.toml:{line}: network.medium: found no rate_bps; allowed: a number: bits ");
+        assert!(said.iter().any(|fault| fault.starts_with(&expected)), "{expected} is not in {said:?}");
+        assert!(said.iter().any(|fault| fault.contains("network.medium.queue: found 0;")), "{said:?}");
+    }
 }
 
 #[test]
