@@ -1,8 +1,8 @@
 //! The verdict at the head of the report: whether all is well, and what happened in a sentence or two.
 
-use super::html::number;
+use super::html::{escape, number};
 use super::vehicle::PATH_THRESHOLD_M;
-use super::{BELOW, Facts, Report, Summary, TheoryRow};
+use super::{BELOW, Facts, Loss, Report, Summary, TheoryRow};
 
 /// How closely a steady error must agree with its prediction to count as predicted.
 const PREDICTED_PART: f64 = 0.1;
@@ -16,11 +16,54 @@ pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
     }
     let is_whole = summary.complete && summary.fleet.messages.balanced;
     let coordinated = (flown > 1).then(|| of_coordination(summary));
-    let parts =
-        [coordinated, Some(of_paths(summary, facts, flown)), of_conditions(report.theory), of_rate(report.theory)];
+    let parts = [
+        of_losses(summary),
+        of_those_that_gave_up(summary),
+        coordinated,
+        Some(of_paths(summary, facts, flown)),
+        of_conditions(report.theory),
+        of_rate(report.theory),
+    ];
     let parts = || parts.iter().flatten();
     let sentences: Vec<&str> = parts().map(|(_, sentence)| sentence.as_str()).collect();
     (is_whole && parts().all(|(good, _)| *good), sentences.join(" "))
+}
+
+/// Who was lost, when, and of whom the numbers are then.
+fn of_losses(summary: &Summary) -> Option<(bool, String)> {
+    let lost = &summary.fleet.lost;
+    let one = |loss: &Loss| {
+        let (id, since_s) = (escape(&loss.vehicle), loss.since_s().map(number));
+        match (since_s, loss.recorded_until_s.map(number)) {
+            (Some(at), Some(_)) => format!("<strong>{id} was lost at {at} s</strong>"),
+            (Some(at), None) => format!("<strong>{id} was lost at {at} s</strong>, and there is no log of it"),
+            (None, Some(at)) => format!("<strong>The log of {id} ends at {at} s</strong>"),
+            (None, None) => format!("<strong>There is no log of {id}</strong>"),
+        }
+    };
+    let sentences: Vec<String> = lost.iter().map(one).collect();
+    let measured = summary.vehicles.iter().filter(|vehicle| vehicle.rows > 0);
+    let others: Vec<String> = measured.map(|vehicle| escape(&vehicle.id)).collect();
+    let of_the_others = match lost.iter().any(|loss| loss.recorded_until_s.is_none()) {
+        true => format!(": the numbers are of {}", listed(&others)),
+        false => String::new(),
+    };
+    (!lost.is_empty()).then(|| (false, format!("{}{of_the_others}.", sentences.join("; "))))
+}
+
+/// Who gave up, and why.
+fn of_those_that_gave_up(summary: &Summary) -> Option<(bool, String)> {
+    let aborted: Vec<String> = summary.fleet.aborted.iter().map(|text| escape(text)).collect();
+    (!aborted.is_empty()).then(|| (false, format!("<strong>{}</strong>.", aborted.join("; "))))
+}
+
+/// a, b and c.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "nobody".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 /// Whether the fleet came together and stayed so to the end.
