@@ -2,6 +2,7 @@
 //! start, watch, and collect the logs. `now` is the time since mission-control began.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 
 use common::machine::Machine;
@@ -11,6 +12,8 @@ use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{LogPiece, Phase};
 use network_emulator::hub::HUB;
 use vehicle_node::node::STOPPED;
+
+use crate::missing::how_to_bring;
 
 /// Between two questions after the fleet's status.
 const POLL: Span = Span::from_nanos(200_000_000);
@@ -85,6 +88,14 @@ impl Landing {
     /// Which logs are missing and why, in words.
     pub(crate) fn missing_logs(&self) -> impl Iterator<Item = String> + '_ {
         self.missing.iter().map(|(who, why)| format!("log of {who}: {why}"))
+    }
+
+    /// Likewise, with where those are that there are, and how they come to this run.
+    pub(crate) fn missing_logs_of(&self, run: &Path, digest: u64) -> impl Iterator<Item = String> {
+        self.missing.iter().map(move |(who, why)| match why == NO_LOG {
+            true => format!("log of {who}: {why}"),
+            false => format!("log of {who}: {why}; {}", how_to_bring(who, digest, run)),
+        })
     }
 
     /// Whether no log is missing but such as there never was.
@@ -612,5 +623,10 @@ mod tests {
             }
         };
         assert_eq!(missing.iter().map(|(who, _)| who.as_str()).collect::<Vec<_>>(), ["auv2", "auv3"]);
+        let landing = Landing { phase: Phase::Finished, pace: None, missing, aborted: Vec::new() };
+        let told: Vec<String> = landing.missing_logs_of(Path::new("runs/x"), 0xabc).collect();
+        assert_eq!(told[0], "log of auv2: it has no log of this mission");
+        assert!(told[1].starts_with("log of auv3: it did not answer; it is on the machine of auv3 in LOGS/0000000000000abc"));
+        assert!(told[1].ends_with("mission-control report runs/x --logs LOGS"), "{}", told[1]);
     }
 }

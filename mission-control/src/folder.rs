@@ -12,6 +12,7 @@ use common::record::Record;
 use common::time::Time;
 use serde::{Deserialize, Serialize};
 
+use crate::brought::of_one_flight;
 use crate::facts::{facts_at, speed_in_force};
 use crate::missing::damage;
 use crate::results::{Account, ClockSummary, Summary, Theory, write_run_folder};
@@ -111,6 +112,9 @@ pub struct HostFacts {
     /// Whether it was merged without the mission-control that flew it: what was still being recorded then came later.
     #[serde(default)]
     pub salvaged: bool,
+    /// Logs that were brought to it afterwards.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub added: Vec<String>,
 }
 
 impl HostFacts {
@@ -132,6 +136,7 @@ impl HostFacts {
             missing,
             aborted,
             salvaged: false,
+            added: Vec::new(),
         }
     }
 }
@@ -152,11 +157,11 @@ pub fn finish(folder: &Path, host: &HostFacts) -> Result<(Summary, ClockSummary)
     report(folder)
 }
 
-fn host_of(folder: &Path) -> Option<HostFacts> {
+pub(crate) fn host_of(folder: &Path) -> Option<HostFacts> {
     serde_json::from_slice(&fs::read(folder.join(HOST)).ok()?).ok()
 }
 
-fn write_host(folder: &Path, host: &HostFacts) -> Result<(), String> {
+pub(crate) fn write_host(folder: &Path, host: &HostFacts) -> Result<(), String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
     write(&folder.join(HOST), &json)
 }
@@ -175,8 +180,10 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     facts.duration_s = end.secs();
     // A recording by itself has no host facts beside it.
     let host = host_of(folder);
-    let notes =
-        host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)).collect();
+    let made = |host: &HostFacts| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written);
+    let mut notes: Vec<String> = host.iter().map(made).collect();
+    let added = host.iter().filter(|host| !host.added.is_empty());
+    notes.extend(added.map(|host| format!("Logs added afterwards: {}.", host.added.join(", "))));
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
     let reproduce = reproduce(folder, &mission, &recording);
     let account = Account { notes, reproduce };
@@ -237,13 +244,13 @@ pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
         return Ok(None);
     }
     let mission = load(&folder.join(MISSION))?;
-    let logs = logs(folder, mission.digest);
+    let (logs, left_out) = of_one_flight(logs(folder, mission.digest));
     if logs.is_empty() {
         return Ok(None);
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| error.to_string())?;
     let how = format!("mission-control, from {} logs of a run that it did not end,", logs.len());
-    let missing = damage(&merged);
+    let missing: Vec<String> = left_out.into_iter().chain(damage(&merged)).collect();
     let mut notes = vec![format!("Merged from {} logs after the run: mission-control did not end it.", logs.len())];
     notes.extend(missing.iter().map(|text| format!("Missing: {text}")));
     let host = HostFacts { salvaged: true, ..HostFacts::now(&how, None, 0.0, missing, Vec::new()) };

@@ -20,6 +20,7 @@ use common::wire::vehicle::{LogPiece, Phase};
 use common::wire::{self, GarbageCount};
 use network_emulator::hub::COLLECTOR;
 
+use crate::brought::of_one_flight;
 use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
@@ -234,11 +235,13 @@ fn merge_logs(
     landing: &Landing,
     ended_early: Vec<String>,
 ) -> Result<Recorded, Failure> {
-    let merged = merge(logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
+    let (logs, left_out) = of_one_flight(logs.to_vec());
+    let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
     let pace = landing.pace.unwrap_or(plan.pace);
     let cut_short = missing::cut_short(&plan.mission, landing.phase, &merged);
     let sound = landing.phase == Phase::Finished && landing.aborted.is_empty() && cut_short.is_empty();
-    let mut all: Vec<String> = landing.missing_logs().chain(ended_early).collect();
+    let missing_logs = landing.missing_logs_of(folder, plan.mission.digest);
+    let mut all: Vec<String> = missing_logs.chain(ended_early).chain(left_out).collect();
     all.extend(missing::damage(&merged));
     all.extend(missing::late_beginnings(&plan.mission, pace, &merged));
     let untold = cut_short.into_iter().filter(|(id, _)| !missing::gave_up(&landing.aborted, id));

@@ -157,11 +157,19 @@ enum What {
     },
     /// Make summary, figures and report of a run again; its recording too, if mission-control was killed
     #[command(
-        after_help = "Example:\n  mission-control report runs/auv-helix-2026-01-31-120000\n\nExit codes: 0 made, 4 files cannot be read or written."
+        after_help = "A vehicle that was out of reach when the logs were collected keeps its own in LOGS/DIGEST, where LOGS is what its\n\
+        vehicle-node was told by --logs. Bring the folder here and name it; the recording is merged again.\n\n\
+        Example:\n  mission-control report runs/auv-helix-2026-01-31-120000\n  \
+        mission-control report runs/auv-helix-2026-01-31-120000 --logs auv3-logs\n\n\
+        Exit codes: 0 made, 4 files cannot be read or written, or no log could be added."
     )]
     Report {
         /// The run folder
         run: PathBuf,
+        /// First add the logs that the run lacks from this folder (as --logs of vehicle-node names it), or this log; those of
+        /// another mission or flight are refused
+        #[arg(long, value_name = "DIR")]
+        logs: Option<PathBuf>,
     },
     /// Write a run's recording in another format
     #[command(
@@ -265,7 +273,7 @@ fn run(what: What) -> Ended {
         What::Speed { speed, fleet } => fleet::speed(speed, &fleet.attach),
         What::Status { json, fleet } => fleet::status(json, &fleet.attach),
         What::Stop { fleet } => fleet::stop(&fleet.attach),
-        What::Report { run } => recordings::report(&run),
+        What::Report { run, logs } => recordings::report(&run, logs.as_deref()),
         What::Export { run, format, out } => recordings::export(&run, format, out),
         What::Diff { a, b } => recordings::diff(&a, &b),
         What::Recover { recording, out } => recordings::recover(&recording, out),

@@ -147,6 +147,7 @@ pub(super) fn fleet(spatial: bool) -> Recording {
         mission_toml: "name = \"three-helices\"\n\n[network]\nloss = 0.06   # <5 % & more\n".into(),
         digest: "3f1c9a77d0e2b4f6".into(),
         seed: 42,
+        start_unix_ns: None,
         exact,
         clock: achieved.chain(ticks).chain([note]).collect(),
         complete: true,
