@@ -290,13 +290,16 @@ pub fn discard(folder: &Path) {
 pub fn recording(run: &Path) -> Result<Recording, String> {
     let path = if run.is_dir() { run.join(RECORDING) } else { run.to_path_buf() };
     if !path.exists() {
-        let logs = run.join("logs").is_dir();
-        let how = if logs {
-            format!("; `mission-control report {}` makes it of the logs", run.display())
-        } else {
-            String::new()
-        };
-        return Err(format!("no recording at {}; give a run folder or an .mcap file{how}", path.display()));
+        let (place, name) = (path.display(), run.display());
+        return Err(match (run.join(MISSION).exists(), run.join("logs").is_dir()) {
+            (_, true) => format!("no recording at {place}; `mission-control report {name}` makes it of the logs"),
+            (true, false) => format!(
+                "no recording at {place}: this run was attached to a fleet and did not come to its end; if it flew, its logs are with \
+                 the fleet. Run the same mission with --attach again: that joins a flight under way and collects one that is over; \
+                 or bring the logs here: mission-control report {name} --logs LOGS"
+            ),
+            (false, false) => format!("no recording at {place}; give a run folder or an .mcap file"),
+        });
     }
     let recording = read(&path).map_err(|error| error.to_string())?;
     if recording.mission_toml.is_empty() {
@@ -348,6 +351,23 @@ mod tests {
         assert_eq!(told.last().map(String::as_str), Some(profile));
         let with = text.replace("speed = 0.5", profile);
         assert!(Mission::parse("m", &with).is_ok(), "what is told is a section of a mission");
+    }
+
+    #[test]
+    fn a_run_without_a_recording_says_where_it_may_come_from() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let run = ground.path().join("run");
+        let mission = Mission::parse("m", include_str!("../../missions/auv-helix.toml")).expect("sound");
+        let told = || recording(&run).expect_err("nothing there");
+        assert!(told().ends_with("give a run folder or an .mcap file"), "{}", told());
+        make(Some(&run), &mission).expect("makes");
+        let attached = told();
+        assert!(attached.contains("was attached to a fleet") && attached.contains("with --attach again"), "{attached}");
+        assert!(attached.ends_with(&format!("report {} --logs LOGS", run.display())), "{attached}");
+        // What is said is so: the same command with the same folder is let in.
+        assert_eq!(make(Some(&run), &mission), Ok(run.clone()));
+        fs::create_dir_all(run.join("logs")).expect("makes");
+        assert!(told().contains("makes it of the logs"), "{}", told());
     }
 
     #[test]
