@@ -13,7 +13,7 @@ use common::time::Time;
 use serde::{Deserialize, Serialize};
 
 use crate::brought::of_one_flight;
-use crate::facts::{facts_at, speed_in_force};
+use crate::facts::{commanded, facts_at, speed_in_force};
 use crate::missing::damage;
 use crate::results::{Account, ClockSummary, Summary, Theory, write_run_folder};
 use crate::theory;
@@ -178,6 +178,7 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     let end = flown.map_or(mission.end, |t_ns| Time::from_nanos(t_ns).min(mission.end));
     let mut facts = facts_at(&mission, speed_in_force(&mission, &recording.exact, end));
     facts.duration_s = end.secs();
+    facts.commanded = commanded(&mission, &recording.exact);
     // A recording by itself has no host facts beside it.
     let host = host_of(folder);
     let made = |host: &HostFacts| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written);
@@ -199,14 +200,7 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
 fn reproduce(folder: &Path, mission: &Mission, recording: &Recording) -> Vec<String> {
     let mut lines = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
     let planned = mission.speed.steps();
-    let commanded = recording.exact.iter().filter_map(|row| match row {
-        Record::Speed(row) if !planned.iter().any(|step| (step.at.nanos(), step.speed) == (row.t_ns, row.speed)) => {
-            Some((row.t_ns as f64 / 1e9, row.speed))
-        }
-        _ => None,
-    });
-    let mut commanded: Vec<(f64, f64)> = commanded.collect();
-    commanded.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let commanded = commanded(mission, &recording.exact);
     let Some((first, _)) = commanded.first().copied() else { return lines };
     // A command replaces what the profile says from then on.
     let before = planned.iter().map(|step| (step.at.secs().max(0.0), step.speed)).filter(|(at, _)| *at < first);

@@ -8,7 +8,9 @@ use bus::queue::{Events, Wake, recv_until};
 use bus::setup::Endpoint;
 use common::wire;
 use common::wire::fleet::{FleetStatus, FromFleet, ToFleet};
+use common::wire::vehicle::Phase;
 use network_emulator::hub::OPERATOR;
+use vehicle_node::node::STOPPED;
 
 /// How long the fleet may take to answer.
 const ANSWER: Duration = Duration::from_secs(5);
@@ -67,8 +69,12 @@ pub fn describe(status: &FleetStatus) -> String {
     }
     for vehicle in &status.vehicles {
         let line = if vehicle.connected { "connected" } else { "not connected" };
-        let reason = if vehicle.reason.is_empty() { String::new() } else { format!(": {}", vehicle.reason) };
-        let _ = writeln!(text, "  {:<16} {:<14} {}{reason}", vehicle.id, line, vehicle.phase.as_str());
+        let how = match (vehicle.phase, vehicle.reason.as_str()) {
+            (Phase::Aborted, STOPPED) => STOPPED.to_string(),
+            (phase, "") => phase.as_str().to_string(),
+            (phase, reason) => format!("{}: {reason}", phase.as_str()),
+        };
+        let _ = writeln!(text, "  {:<16} {:<14} {how}", vehicle.id, line);
     }
     text
 }

@@ -12,6 +12,7 @@ use common::wire::vehicle::{ClockPlan, Phase};
 
 use super::mission::{load, print_theory, warn};
 use super::{End, Ended};
+use crate::console::error_in_words;
 use crate::results::{ClockVerdict, MessageCounts, Summary};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::plan;
@@ -177,7 +178,7 @@ fn tell_messages(m: &MessageCounts) {
 fn coordination_at_end(summary: &Summary) -> String {
     let coordination = &summary.fleet.coordination;
     let value = match coordination.last.is_finite() {
-        true => format!("{:.2e}", coordination.last),
+        true => error_in_words(coordination.last_norm(), coordination.last),
         false => "beyond what can be told".to_string(),
     };
     match (coordination.last_s, coordination.early(summary.duration_s)) {

@@ -88,6 +88,11 @@ impl CoordinationSummary {
         self.at_least_guaranteed = comparable.map(|(fit, guaranteed)| fit.rate >= (1.0 - FIT_PART) * least(guaranteed));
     }
 
+    /// ‖e‖ = ‖(I − 11ᵀ/n)x‖ at the instant of the last value.
+    pub fn last_norm(&self) -> f64 {
+        self.series.norm.last().copied().unwrap_or(f64::NAN)
+    }
+
     /// The instant of the last value, if that is not the end of the run: a vehicle was away from then on.
     pub fn early(&self, duration_s: f64) -> Option<f64> {
         self.last_s.filter(|last_s| is_early(*last_s, duration_s))

@@ -488,6 +488,18 @@ mod tests {
     }
 
     #[test]
+    fn the_head_says_that_a_flight_was_stopped_and_its_speed_changed() {
+        use common::record::{ClockRecord, NoteRow};
+        let mut recording = fleet(true);
+        let (text, source) = ("flight ended: stopped by mission-control".to_owned(), "network-emulator".to_owned());
+        recording.clock.push(ClockRecord::Note(NoteRow { t_ns: 400_000_000_000, source, text, count: 1 }));
+        let facts = Facts { planned_s: 800.0, commanded: vec![(60.0, 0.4)], ..facts(true) };
+        let page = page_of(&recording, &facts);
+        assert!(page.contains("<strong>Stopped by mission-control</strong> at 400 of 800 s."), "{page}");
+        assert!(page.contains("v_L was changed under way to 0.4 /s at 60 s.") && page.contains("verdict attention"));
+    }
+
+    #[test]
     fn a_number_that_is_not_of_the_end_has_its_instant() {
         let (mut recording, facts) = (fleet(true), facts(true));
         let last = recording.exact.iter().map(common::record::Record::t_ns).max().expect("rows");

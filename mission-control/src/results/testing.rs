@@ -51,6 +51,8 @@ pub(super) fn facts(spatial: bool) -> Facts {
         links: LINKS.iter().map(|(from, to)| ((*from).into(), (*to).into())).collect(),
         message_bytes: 40,
         duration_s: 400.0,
+        planned_s: 400.0,
+        commanded: Vec::new(),
         control_period_s: 0.1,
         validity_s: Some(1.5),
         link_period_s: Some(10.0),

@@ -1,6 +1,9 @@
 //! The verdict at the head of the report: whether all is well, and what happened in a sentence or two.
 
+use network_emulator::hub::ENDED;
+
 use super::html::{escape, number};
+use super::series::is_early;
 use super::vehicle::PATH_THRESHOLD_M;
 use super::{BELOW, Facts, Loss, Report, Summary, TheoryRow};
 
@@ -17,6 +20,8 @@ pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
     let is_whole = summary.complete && summary.fleet.messages.balanced;
     let coordinated = (flown > 1).then(|| of_coordination(summary));
     let parts = [
+        of_end(report),
+        of_speeds(facts),
         of_losses(summary),
         of_those_that_gave_up(summary),
         coordinated,
@@ -27,6 +32,32 @@ pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
     let parts = || parts.iter().flatten();
     let sentences: Vec<&str> = parts().map(|(_, sentence)| sentence.as_str()).collect();
     (is_whole && parts().all(|(good, _)| *good), sentences.join(" "))
+}
+
+/// That the flight ended before its time, and why.
+fn of_end(report: &Report<'_>) -> Option<(bool, String)> {
+    let (flown_s, planned_s) = (report.summary.duration_s, report.facts.planned_s);
+    if !is_early(flown_s, planned_s) {
+        return None;
+    }
+    let why = report.clock.notes.iter().rev().find_map(|note| note.text.strip_prefix(ENDED));
+    let why = why.map_or("Ended".to_owned(), |why| {
+        let mut letters = why.chars();
+        let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+        escape(&format!("{first}{}", letters.as_str()))
+    });
+    Some((false, format!("<strong>{why}</strong> at {} of {} s.", number(flown_s), number(planned_s))))
+}
+
+/// Formation speeds that were commanded under way: the numbers are of more than one.
+fn of_speeds(facts: &Facts) -> Option<(bool, String)> {
+    let (last_s, last) = facts.commanded.last()?;
+    let often = match facts.commanded.len() {
+        1 => String::new(),
+        times => format!(", the last of {times} times"),
+    };
+    let (last, at) = (number(*last), number(*last_s));
+    Some((true, format!("The formation speed v_L was changed under way to {last} /s at {at} s{often}.")))
 }
 
 /// Who was lost, when, and of whom the numbers are then.

@@ -8,7 +8,7 @@ use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
 
-use super::{COLLECTOR, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
+use super::{COLLECTOR, ENDED, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
 use crate::emulator::Emulator;
 
 impl Hub {
@@ -212,11 +212,11 @@ impl Hub {
         if was_running {
             load.emulator.finish(now);
             self.drain_emulator();
-            self.note(now, why);
+            self.note(now, &format!("{ENDED}{why}"));
             self.outputs.push_back(HubOutput::CloseLog);
         }
         self.tell_fleet(&ToVehicle::Stop);
-        self.say(format!("flight ended: {why}"));
+        self.say(format!("{ENDED}{why}"));
         self.status(now);
     }
 
