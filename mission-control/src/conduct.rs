@@ -456,6 +456,7 @@ mod tests {
             collected: false,
             pace: matches!(phase, Phase::Running | Phase::Finished | Phase::Aborted).then_some(Pace::Stepped),
             messages: [0; 4],
+            counted_from: Time::ZERO,
         }
     }
 

@@ -11,7 +11,7 @@ use vehicle_node::node::STOPPED;
 
 use super::network::Network;
 use super::premises::{looked_for, planned_exchange, tolerance};
-use super::watched::{margins, network_words};
+use super::watched::network_words;
 use crate::console::{error_in_words, short};
 
 /// Whoever was heard longer ago than this many message periods, and a second, has fallen silent.
@@ -113,9 +113,9 @@ fn said(
     allowed: Option<f64>,
     verdict: String,
 ) -> SoFar {
-    let mut words = format!("network so far: {}", network_words(watch));
-    if !watch.margins.is_empty() {
-        words += &format!("\n{}", margins(watch));
+    let mut words = format!("network so far, as planned: {}", network_words(watch));
+    for margin in &watch.margins {
+        words += &format!("\n{}", margin.in_words());
     }
     if let Some((error, largest)) = errors_now {
         let allowed = allowed.map_or(String::new(), |allowed| format!(", at most {} allowed", short(allowed)));
@@ -218,6 +218,7 @@ mod tests {
             vehicles: vehicles.collect(),
             collected: false,
             messages: [0; 4],
+            counted_from: Time::ZERO,
             pace: None,
         };
         (mission, status)
@@ -230,6 +231,7 @@ mod tests {
         assert!(so_far.verdict.starts_with("covered by Theorem 4.4"), "{}", so_far.verdict);
         assert!((so_far.error.expect("all spoke") - 0.02f64.sqrt()).abs() < 1e-9);
         assert!(so_far.to_string().contains("coordination error now: ‖e‖ = 0.1414, max |x_i − x_j| = 0.2;"), "{so_far}");
+        assert!(so_far.to_string().contains("network so far, as planned: α = ") && so_far.to_string().contains("less than 0.625 s will do"));
         assert!(so_far.to_string().contains("dwell time 2.500 s") && so_far.margins.len() >= 5, "{so_far}");
         let (mission, far) = at(60.0, [10.0, 30.0, 90.0], [true; 3]);
         let so_far = super::so_far(&mission, &far).expect("time has passed");

@@ -6,7 +6,7 @@
 use common::graph::Graph;
 use common::mission::Mission;
 use common::mission::file::LawChoice;
-use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch, Watched};
+use common::theory::monitor::{self, Envelope, Exchange, Judgement, Margin, Premise, Seen, Tolerance, Watch, Watched};
 use common::time::Span;
 
 use super::network::Network;
@@ -254,11 +254,8 @@ pub(super) fn network_words(watch: &Watch) -> String {
 }
 
 /// Every condition with its value and its limit.
-pub(super) fn margins(watch: &Watch) -> String {
-    let words = watch.margins.iter().map(|margin| {
-        format!("{}: {} = {:.4}, limit {:.4}", margin.statement, margin.quantity, margin.value, margin.limit)
-    });
-    words.collect::<Vec<_>>().join("; ")
+fn margins(watch: &Watch) -> String {
+    watch.margins.iter().map(Margin::in_words).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]

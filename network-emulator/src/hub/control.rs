@@ -88,6 +88,7 @@ impl Hub {
                 ClockPlan::Stepped => Pace::Stepped,
             }),
             messages: self.totals(),
+            counted_from: load.map_or(Time::ZERO, |load| load.counted_from),
         };
         self.answer(FromFleet::Status(status));
     }
@@ -132,6 +133,7 @@ impl Hub {
             speeds: Vec::new(),
             adopted,
             collected: false,
+            counted_from: Time::ZERO,
             now: Time::ZERO,
         });
         self.take_seats();

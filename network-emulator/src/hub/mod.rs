@@ -168,6 +168,8 @@ struct Load {
     adopted: bool,
     /// Its logs are where they belong.
     collected: bool,
+    /// From when on messages are counted.
+    counted_from: Time,
     now: Time,
 }
 

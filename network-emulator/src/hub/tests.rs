@@ -234,6 +234,24 @@ fn a_hub_without_memory_that_was_given_the_mission_again_takes_up_the_flight() {
     assert!(said.contains(&HubOutput::FollowClock(epoch())), "{said:?}");
 }
 
+#[test]
+fn a_hub_that_takes_up_a_flight_says_since_when_it_counts() {
+    let counted = |hub: &mut Hub, at_s: f64| {
+        let said = ask(hub, Time::from_secs(at_s), ToFleet::Status);
+        said.into_iter().find_map(|output| match output {
+            HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some(status.counted_from),
+            _ => None,
+        })
+    };
+    let mut first = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    assert_eq!(counted(&mut first, 60.0), Some(Time::ZERO));
+    let mut back = Hub::new();
+    back.handle(Time::ZERO, Some(joined("auv3")));
+    hello(&mut back, "auv3", running(vec![], 0));
+    back.handle(Time::from_secs(50.0), Some(HubInput::ClockStarted(epoch())));
+    assert_eq!(counted(&mut back, 60.0), Some(Time::from_secs(50.0)));
+}
+
 fn recorded(outputs: &[HubOutput]) -> Vec<&common::record::Record> {
     let record = |output| match output {
         &HubOutput::Record(Row::Exact(ref record)) => Some(record),
