@@ -280,7 +280,13 @@ impl Conduct {
                 .filter(|v| !(v.connected && v.phase == Phase::Armed))
                 .map(|v| format!("{} ({})", v.id, if v.connected { v.phase.as_str() } else { "not connected" }))
                 .collect();
-            self.fail(format!("not every vehicle came to be armed; still waiting for {}", waiting.join(", ")));
+            let absent = of_mission().filter(|v| self.collects && !v.connected);
+            let absent: Vec<String> = absent.map(|v| format!("vehicle-node --id {}", v.id)).collect();
+            let hint = match absent.is_empty() {
+                true => String::new(),
+                false => format!("; start with: {} (--connect says where the fleet is)", absent.join(", ")),
+            };
+            self.fail(format!("not every vehicle came to be armed; still waiting for {}{hint}", waiting.join(", ")));
         }
     }
 
@@ -557,12 +563,12 @@ mod tests {
 
     #[test]
     fn who_is_missing_is_named_when_patience_ends() {
-        let mut conduct = conduct(false);
+        let mut conduct = conduct(true);
         hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
         let mut waiting = status(Phase::Armed, HELIX, Phase::Armed);
         waiting.vehicles[2].connected = false;
         let said = hears(&mut conduct, 61.0, FromFleet::Status(waiting));
-        assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)")), "{said:?}");
+        assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)") && r.contains("start with: vehicle-node --id auv3 ")), "{said:?}");
     }
 
     #[test]

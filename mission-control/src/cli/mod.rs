@@ -131,7 +131,7 @@ enum What {
     )]
     Speed {
         /// The speed v_L (units of xi per s)
-        #[arg(allow_negative_numbers = true)]
+        #[arg(allow_negative_numbers = true, value_parser = number)]
         speed: f64,
         #[command(flatten)]
         fleet: FleetArgs,
@@ -285,8 +285,34 @@ fn run(what: What) -> Ended {
     }
 }
 
+/// A number, as given on a command line.
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "allowed: a number, such as 0.4".to_string())
+}
+
 /// A word of a command as a shell takes it.
 fn quoted(word: String) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
     if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a wrong command.
+    fn refused(words: &[&str]) -> String {
+        let words = ["mission-control"].iter().chain(words);
+        Cli::try_parse_from(words).map(|_| ()).expect_err("wrong").to_string()
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_told_what_is_allowed() {
+        let speed = refused(&["speed", "abc"]);
+        assert!(speed.contains("'abc'") && speed.contains("allowed: a number, such as 0.4"), "{speed}");
+        for factor in ["0", "abc", "-1", "1001", "nan"] {
+            let said = refused(&["run", "m.toml", "--speed-up", factor]);
+            assert!(said.contains(&format!("'{factor}'")) && said.contains("allowed: 0.001 to 1000"), "{said}");
+        }
+    }
 }
