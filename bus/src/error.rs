@@ -91,7 +91,8 @@ impl fmt::Display for Error {
             }
             Error::PortInUse(endpoint) => write!(
                 f,
-                "{endpoint} is already in use: another network-emulator may be running there; stop it or choose another port"
+                "{endpoint} is already in use: another network-emulator may be running there; stop it, or choose \
+                 another port with --listen (port 0 takes a free one)"
             ),
             Error::CannotListen { endpoint, why } => write!(f, "cannot listen on {endpoint}: {why}"),
             Error::NoHub { endpoint, waited, why } => {

@@ -6,6 +6,7 @@
 
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -105,6 +106,8 @@ struct Shared {
     tally: Arc<Tally>,
     /// The living session's way out, if there is one.
     inbox: Mutex<Option<Arc<Inbox<LineEvent>>>>,
+    /// Whether the program is about to leave: a hub that goes then is not missed.
+    leaving: AtomicBool,
 }
 
 impl Shared {
@@ -126,7 +129,8 @@ impl Line {
         let (events, receiver) = queue(config.queue);
         let (signals, orders) = mpsc::channel();
         let tally = Arc::new(Tally::of("the network-emulator"));
-        let shared = Arc::new(Shared { id: config.id, tally, inbox: Mutex::default() });
+        let shared =
+            Arc::new(Shared { id: config.id, tally, inbox: Mutex::default(), leaving: AtomicBool::new(false) });
         let mut keeper = Keeper {
             endpoint: config.endpoint,
             // A number that no other incarnation of this participant has; the standard library's hasher has a seed.
@@ -169,6 +173,13 @@ impl Line {
         self.shared.tally.counts()
     }
 
+    /// Sends a last message and leaves. A hub that ends because of it is not missed.
+    pub fn close_with(self, plane: Plane, bytes: &[u8]) -> Result<()> {
+        self.shared.leaving.store(true, Ordering::Relaxed);
+        self.send(plane, bytes)
+        // Dropping does the rest.
+    }
+
     /// Lets the hub take what was sent to it (for a second at most), then leaves.
     pub fn close(self) {
         // Dropping does it.
@@ -177,6 +188,7 @@ impl Line {
 
 impl Drop for Line {
     fn drop(&mut self) {
+        self.shared.leaving.store(true, Ordering::Relaxed);
         if let Some(inbox) = self.shared.inbox().filter(|inbox| inbox.is_open())
             && inbox.outbox.ask_to_acknowledge().is_ok()
         {
@@ -237,6 +249,9 @@ impl Keeper {
         loop {
             match self.orders.recv() {
                 Ok(Signal::HubGone(number)) if self.link.as_ref().is_some_and(|link| link.number == number) => {
+                    if self.shared.leaving.load(Ordering::Relaxed) {
+                        return self.hang_up();
+                    }
                     tracing::warn!("{}: the network-emulator is gone; looking for it", self.shared.id);
                     self.hang_up();
                     if !self.events.announce(LineEvent::Lost) {

@@ -7,7 +7,7 @@
 use std::fmt;
 
 /// Both ends must speak the same.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// The longest identity of a participant.
 const LONGEST_ID: usize = 32;

@@ -26,9 +26,10 @@ const PIECE: usize = 512 << 10;
 /// Logs of earlier flights of a mission that are kept, of each name: the newest.
 const KEPT: u64 = 5;
 
-/// Where a recording comes from.
-pub fn origin(mission: &Mission) -> Origin {
-    Origin { mission_toml: mission.text.clone(), digest: format!("{:016x}", mission.digest), seed: mission.seed }
+/// Where a recording comes from; `start_unix_ns` is when mission time is zero, if it passes with the wall clock.
+pub fn origin(mission: &Mission, start_unix_ns: Option<i64>) -> Origin {
+    let digest = format!("{:016x}", mission.digest);
+    Origin { mission_toml: mission.text.clone(), digest, seed: mission.seed, start_unix_ns }
 }
 
 /// What earlier lives of a process recorded in a flight.
@@ -130,12 +131,12 @@ impl Logs {
         (1..).map(|life| folder.join(name(life))).take_while(|path| path.exists()).collect()
     }
 
-    /// Begins a log of this mission. If `fresh`, what earlier flights of the same mission left is set aside; otherwise it
+    /// Begins a log of a flight of this mission that starts then. If `fresh`, what earlier flights of the same mission left is set aside; otherwise it
     /// is kept, and its end is returned.
     ///
     /// # Errors
     /// Why the file cannot be made.
-    pub fn open(&mut self, mission: &Mission, fresh: bool) -> Result<Earlier, String> {
+    pub fn open(&mut self, mission: &Mission, start_unix_ns: Option<i64>, fresh: bool) -> Result<Earlier, String> {
         self.close();
         let folder = self.folder_of(mission.digest);
         let refused = |error: &dyn std::fmt::Display| format!("cannot record in {}: {error}", folder.display());
@@ -149,8 +150,8 @@ impl Logs {
         } else {
             earlier = ends_of(&files);
         }
-        let (path, recorder) =
-            Recorder::create_next(&folder, &self.stem, &origin(mission)).map_err(|error| refused(&error))?;
+        let origin = origin(mission, start_unix_ns);
+        let (path, recorder) = Recorder::create_next(&folder, &self.stem, &origin).map_err(|error| refused(&error))?;
         tracing::debug!("recording in {}", path.display());
         let (to_disk, queue) = sync_channel(QUEUE);
         let vehicles = mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect::<Vec<_>>();
@@ -342,7 +343,7 @@ mod tests {
     fn a_command_is_on_disk_at_once() {
         let folder = tempfile::tempdir().expect("directory");
         let mut logs = Logs::new(folder.path(), "hub");
-        logs.open(&mission(), true).expect("opens");
+        logs.open(&mission(), None, true).expect("opens");
         logs.write(speed(7));
         let path = logs.folder_of(mission().digest).join("hub.mcap");
         // The thread that writes is not asked to tend or close: a process that is killed does neither.
@@ -357,11 +358,21 @@ mod tests {
     fn the_end_of_an_earlier_life_is_known() {
         let folder = tempfile::tempdir().expect("directory");
         let mut logs = Logs::new(folder.path(), "hub");
-        assert_eq!(logs.open(&mission(), true).expect("opens"), Earlier::default());
+        assert_eq!(logs.open(&mission(), None, true).expect("opens"), Earlier::default());
         [3, 9, 5].map(speed).into_iter().for_each(|row| logs.write(row));
-        let earlier = logs.open(&mission(), false).expect("opens");
+        let earlier = logs.open(&mission(), None, false).expect("opens");
         assert_eq!(earlier, Earlier { until: Some(Time::from_nanos(9)), last_state: None });
-        assert_eq!(logs.open(&mission(), true).expect("opens"), Earlier::default(), "it is set aside");
+        assert_eq!(logs.open(&mission(), None, true).expect("opens"), Earlier::default(), "it is set aside");
+    }
+
+    #[test]
+    fn a_log_says_of_which_flight_it_is() {
+        let folder = tempfile::tempdir().expect("directory");
+        let mut logs = Logs::new(folder.path(), "hub");
+        logs.open(&mission(), Some(1_700_000_000_000_000_000), true).expect("opens");
+        logs.close();
+        let path = logs.folder_of(mission().digest).join("hub.mcap");
+        assert_eq!(read(path).expect("a recording").start_unix_ns, Some(1_700_000_000_000_000_000));
     }
 
     #[test]
@@ -369,7 +380,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("directory");
         let mut logs = Logs::new(folder.path(), "hub");
         for _ in 0..9 {
-            logs.open(&mission(), true).expect("opens");
+            logs.open(&mission(), None, true).expect("opens");
         }
         logs.close();
         let earlier = logs.folder_of(mission().digest).join("earlier");

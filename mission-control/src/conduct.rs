@@ -2,6 +2,7 @@
 //! start, watch, and collect the logs. `now` is the time since mission-control began.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 
 use common::machine::Machine;
@@ -11,6 +12,8 @@ use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{LogPiece, Phase};
 use network_emulator::hub::HUB;
 use vehicle_node::node::STOPPED;
+
+use crate::missing::how_to_bring;
 
 /// Between two questions after the fleet's status.
 const POLL: Span = Span::from_nanos(200_000_000);
@@ -85,6 +88,14 @@ impl Landing {
     /// Which logs are missing and why, in words.
     pub(crate) fn missing_logs(&self) -> impl Iterator<Item = String> + '_ {
         self.missing.iter().map(|(who, why)| format!("log of {who}: {why}"))
+    }
+
+    /// Likewise, with where those are that there are, and how they come to this run.
+    pub(crate) fn missing_logs_of(&self, run: &Path, digest: u64) -> impl Iterator<Item = String> {
+        self.missing.iter().map(move |(who, why)| match why == NO_LOG {
+            true => format!("log of {who}: {why}"),
+            false => format!("log of {who}: {why}; {}", how_to_bring(who, digest, run)),
+        })
     }
 
     /// Whether no log is missing but such as there never was.
@@ -269,7 +280,13 @@ impl Conduct {
                 .filter(|v| !(v.connected && v.phase == Phase::Armed))
                 .map(|v| format!("{} ({})", v.id, if v.connected { v.phase.as_str() } else { "not connected" }))
                 .collect();
-            self.fail(format!("not every vehicle came to be armed; still waiting for {}", waiting.join(", ")));
+            let absent = of_mission().filter(|v| self.collects && !v.connected);
+            let absent: Vec<String> = absent.map(|v| format!("vehicle-node --id {}", v.id)).collect();
+            let hint = match absent.is_empty() {
+                true => String::new(),
+                false => format!("; start with: {} (--connect says where the fleet is)", absent.join(", ")),
+            };
+            self.fail(format!("not every vehicle came to be armed; still waiting for {}{hint}", waiting.join(", ")));
         }
     }
 
@@ -445,6 +462,7 @@ mod tests {
             collected: false,
             pace: matches!(phase, Phase::Running | Phase::Finished | Phase::Aborted).then_some(Pace::Stepped),
             messages: [0; 4],
+            counted_from: Time::ZERO,
         }
     }
 
@@ -545,12 +563,15 @@ mod tests {
 
     #[test]
     fn who_is_missing_is_named_when_patience_ends() {
-        let mut conduct = conduct(false);
+        let mut conduct = conduct(true);
         hears(&mut conduct, 0.0, FromFleet::Status(status(Phase::Idle, "", Phase::Idle)));
         let mut waiting = status(Phase::Armed, HELIX, Phase::Armed);
         waiting.vehicles[2].connected = false;
         let said = hears(&mut conduct, 61.0, FromFleet::Status(waiting));
-        assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)")), "{said:?}");
+        assert!(
+            matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)") && r.contains("start with: vehicle-node --id auv3 ")),
+            "{said:?}"
+        );
     }
 
     #[test]
@@ -612,5 +633,13 @@ mod tests {
             }
         };
         assert_eq!(missing.iter().map(|(who, _)| who.as_str()).collect::<Vec<_>>(), ["auv2", "auv3"]);
+        let landing = Landing { phase: Phase::Finished, pace: None, missing, aborted: Vec::new() };
+        let told: Vec<String> = landing.missing_logs_of(Path::new("runs/x"), 0xabc).collect();
+        assert_eq!(told[0], "log of auv2: it has no log of this mission");
+        assert!(
+            told[1]
+                .starts_with("log of auv3: it did not answer; it is on the machine of auv3 in LOGS/0000000000000abc")
+        );
+        assert!(told[1].ends_with("mission-control report runs/x --logs LOGS"), "{}", told[1]);
     }
 }

@@ -85,6 +85,26 @@ impl Progress {
     }
 }
 
+/// A number as a person at a terminal reads it: four digits, and a power of ten only where it is short for many zeros.
+pub fn short(value: f64) -> String {
+    let magnitude = value.abs();
+    if !value.is_finite() {
+        return "–".to_string();
+    }
+    if magnitude != 0.0 && !(1e-3..1e6).contains(&magnitude) {
+        return format!("{value:.2e}");
+    }
+    let digits = if magnitude == 0.0 { 0.0 } else { (3.0 - magnitude.log10().floor()).clamp(0.0, 6.0) } as usize;
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
+}
+
+/// The error of a fleet in its two norms, which are not the same number: ‖e‖ = ‖(I − 11ᵀ/n)x‖ is what theorems bound, the largest
+/// difference what one sees.
+pub fn error_in_words(norm: f64, largest: f64) -> String {
+    format!("‖e‖ = {}, max |x_i − x_j| = {}", short(norm), short(largest))
+}
+
 /// How long the rest will take if it goes on as it went; empty as long as nothing is known.
 fn left(elapsed: Duration, done: usize, rest: usize) -> String {
     if done == 0 || rest == 0 {
@@ -168,6 +188,13 @@ mod tests {
         assert_eq!(after(60, 10, 55), ", about 6 min left");
         assert_eq!(after(600, 1, 13), ", about 2 h 10 min left");
         assert_eq!((after(5, 0, 10), after(5, 10, 0)), (String::new(), String::new()));
+    }
+
+    #[test]
+    fn numbers_at_a_terminal_are_short() {
+        let written = [0.0, 2.1666, -13.9, 123_456.7, 0.0123, 5.04e-9, 2e7, f64::NAN].map(short);
+        assert_eq!(written, ["0", "2.167", "-13.9", "123457", "0.0123", "5.04e-9", "2.00e7", "–"]);
+        assert_eq!(error_in_words(1.5366, 2.1666), "‖e‖ = 1.537, max |x_i − x_j| = 2.167");
     }
 
     #[test]

@@ -30,6 +30,21 @@ pub fn speed_in_force(mission: &Mission, exact: &[Record], t: Time) -> f64 {
     profile.at(t).v_l
 }
 
+/// The formation speeds that were commanded in a recorded flight, in order of time: from when on \[s\], and what. Those that its file
+/// plans are none.
+pub fn commanded(mission: &Mission, exact: &[Record]) -> Vec<(f64, f64)> {
+    let planned = mission.speed.steps();
+    let rows = exact.iter().filter_map(|row| match row {
+        Record::Speed(row) if !planned.iter().any(|step| (step.at.nanos(), step.speed) == (row.t_ns, row.speed)) => {
+            Some((row.t_ns as f64 / 1e9, row.speed))
+        }
+        _ => None,
+    });
+    let mut commanded: Vec<(f64, f64)> = rows.collect();
+    commanded.sort_by(|a, b| a.0.total_cmp(&b.0));
+    commanded
+}
+
 /// The facts of a mission at whose end this formation speed was in force.
 pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
     // The mission was made from this text, so it can be read again.
@@ -44,6 +59,8 @@ pub fn facts_at(mission: &Mission, v_l: f64) -> Facts {
         links: mission.links.iter().map(|link| (name(link.from), name(link.to))).collect(),
         message_bytes: (0..mission.vehicles.len()).map(|i| bytes_on_air(mission, i)).max().unwrap_or(0),
         duration_s: mission.end.secs(),
+        planned_s: mission.end.secs(),
+        commanded: Vec::new(),
         control_period_s: mission.control_period.secs(),
         validity_s: mission.validity.map(|validity| validity.secs()),
         link_period_s: file.as_ref().and_then(period_of),

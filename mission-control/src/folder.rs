@@ -12,7 +12,8 @@ use common::record::Record;
 use common::time::Time;
 use serde::{Deserialize, Serialize};
 
-use crate::facts::{facts_at, speed_in_force};
+use crate::brought::of_one_flight;
+use crate::facts::{commanded, facts_at, speed_in_force};
 use crate::missing::damage;
 use crate::results::{Account, ClockSummary, Summary, Theory, write_run_folder};
 use crate::theory;
@@ -134,6 +135,9 @@ pub struct HostFacts {
     /// Whether it was merged without the mission-control that flew it: what was still being recorded then came later.
     #[serde(default)]
     pub salvaged: bool,
+    /// Logs that were brought to it afterwards.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub added: Vec<String>,
 }
 
 impl HostFacts {
@@ -155,6 +159,7 @@ impl HostFacts {
             missing,
             aborted,
             salvaged: false,
+            added: Vec::new(),
         }
     }
 }
@@ -175,11 +180,11 @@ pub fn finish(folder: &Path, host: &HostFacts) -> Result<(Summary, ClockSummary)
     report(folder)
 }
 
-fn host_of(folder: &Path) -> Option<HostFacts> {
+pub(crate) fn host_of(folder: &Path) -> Option<HostFacts> {
     serde_json::from_slice(&fs::read(folder.join(HOST)).ok()?).ok()
 }
 
-fn write_host(folder: &Path, host: &HostFacts) -> Result<(), String> {
+pub(crate) fn write_host(folder: &Path, host: &HostFacts) -> Result<(), String> {
     let json = serde_json::to_vec_pretty(host).map_err(|error| error.to_string())?;
     write(&folder.join(HOST), &json)
 }
@@ -196,10 +201,13 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     let end = flown.map_or(mission.end, |t_ns| Time::from_nanos(t_ns).min(mission.end));
     let mut facts = facts_at(&mission, speed_in_force(&mission, &recording.exact, end));
     facts.duration_s = end.secs();
+    facts.commanded = commanded(&mission, &recording.exact);
     // A recording by itself has no host facts beside it.
     let host = host_of(folder);
-    let notes =
-        host.iter().map(|host| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written)).collect();
+    let made = |host: &HostFacts| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written);
+    let mut notes: Vec<String> = host.iter().map(made).collect();
+    let added = host.iter().filter(|host| !host.added.is_empty());
+    notes.extend(added.map(|host| format!("Logs added afterwards: {}.", host.added.join(", "))));
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
     let reproduce = reproduce(folder, &mission, &recording);
     let account = Account { notes, reproduce };
@@ -215,14 +223,7 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
 fn reproduce(folder: &Path, mission: &Mission, recording: &Recording) -> Vec<String> {
     let mut lines = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
     let planned = mission.speed.steps();
-    let commanded = recording.exact.iter().filter_map(|row| match row {
-        Record::Speed(row) if !planned.iter().any(|step| (step.at.nanos(), step.speed) == (row.t_ns, row.speed)) => {
-            Some((row.t_ns as f64 / 1e9, row.speed))
-        }
-        _ => None,
-    });
-    let mut commanded: Vec<(f64, f64)> = commanded.collect();
-    commanded.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let commanded = commanded(mission, &recording.exact);
     let Some((first, _)) = commanded.first().copied() else { return lines };
     // A command replaces what the profile says from then on.
     let before = planned.iter().map(|step| (step.at.secs().max(0.0), step.speed)).filter(|(at, _)| *at < first);
@@ -266,13 +267,13 @@ pub fn salvage(folder: &Path) -> Result<Option<Vec<String>>, String> {
         return Ok(None);
     }
     let mission = load(&folder.join(MISSION))?;
-    let logs = logs(folder, mission.digest);
+    let (logs, left_out) = of_one_flight(logs(folder, mission.digest));
     if logs.is_empty() {
         return Ok(None);
     }
     let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| error.to_string())?;
     let how = format!("mission-control, from {} logs of a run that it did not end,", logs.len());
-    let missing = damage(&merged);
+    let missing: Vec<String> = left_out.into_iter().chain(damage(&merged)).collect();
     let mut notes = vec![format!("Merged from {} logs after the run: mission-control did not end it.", logs.len())];
     notes.extend(missing.iter().map(|text| format!("Missing: {text}")));
     let host = HostFacts { salvaged: true, ..HostFacts::now(&how, None, 0.0, missing, Vec::new()) };
@@ -312,12 +313,19 @@ pub fn discard(folder: &Path) {
 pub fn recording(run: &Path) -> Result<Recording, String> {
     let path = if run.is_dir() { run.join(RECORDING) } else { run.to_path_buf() };
     if !path.exists() {
-        let how = if has_logs(run) {
-            format!("; `mission-control report {}` makes it of the logs", run.display())
-        } else {
-            String::new()
-        };
-        return Err(format!("no recording at {}; give a run folder or an .mcap file{how}", path.display()));
+        let (place, name) = (path.display(), run.display());
+        return Err(match (run.join(MISSION).exists(), has_logs(run)) {
+            (_, true) => format!("no recording at {place}; `mission-control report {name}` makes it of the logs"),
+            (true, false) if run.join("logs").is_dir() => {
+                format!("no recording at {place}, and no logs to make it of: this flight was over before it began")
+            }
+            (true, false) => format!(
+                "no recording at {place}: this run was attached to a fleet and did not come to its end; if it flew, its logs are with \
+                 the fleet. Run the same mission with --attach again: that joins a flight under way and collects one that is over; \
+                 or bring the logs here: mission-control report {name} --logs LOGS"
+            ),
+            (false, false) => format!("no recording at {place}; give a run folder or an .mcap file"),
+        });
     }
     let recording = read(&path).map_err(|error| error.to_string())?;
     if recording.mission_toml.is_empty() {
@@ -369,6 +377,23 @@ mod tests {
         assert_eq!(told.last().map(String::as_str), Some(profile));
         let with = text.replace("speed = 0.5", profile);
         assert!(Mission::parse("m", &with).is_ok(), "what is told is a section of a mission");
+    }
+
+    #[test]
+    fn a_run_without_a_recording_says_where_it_may_come_from() {
+        let ground = tempfile::tempdir().expect("a folder");
+        let run = ground.path().join("run");
+        let mission = Mission::parse("m", include_str!("../../missions/auv-helix.toml")).expect("sound");
+        let told = || recording(&run).expect_err("nothing there");
+        assert!(told().ends_with("give a run folder or an .mcap file"), "{}", told());
+        make(Some(&run), &mission).expect("makes");
+        let attached = told();
+        assert!(attached.contains("was attached to a fleet") && attached.contains("with --attach again"), "{attached}");
+        assert!(attached.ends_with(&format!("report {} --logs LOGS", run.display())), "{attached}");
+        // What is said is so: the same command with the same folder is let in.
+        assert_eq!(make(Some(&run), &mission), Ok(run.clone()));
+        fs::create_dir_all(run.join("logs")).expect("makes");
+        assert!(told().contains("makes it of the logs"), "{}", told());
     }
 
     #[test]

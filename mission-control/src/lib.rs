@@ -5,6 +5,7 @@
 //! one page, [`sweep`] varies one.
 
 pub mod batch;
+mod brought;
 pub mod cli;
 pub mod conduct;
 pub mod console;

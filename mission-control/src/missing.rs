@@ -7,6 +7,7 @@ use common::mission::Mission;
 use common::time::{Span, Time};
 use common::wire::fleet::Pace;
 use common::wire::vehicle::Phase;
+use network_emulator::hub::HUB;
 
 /// Logs that end in the middle, pieces of them that are left out because they are damaged, and logs that are no recordings.
 pub(crate) fn damage(merged: &Merged) -> Vec<String> {
@@ -35,6 +36,23 @@ pub(crate) fn cut_short(mission: &Mission, phase: Phase, merged: &Merged) -> Vec
 /// Whether a vehicle is among those that gave up: its states end early, and that is told already.
 pub(crate) fn gave_up(aborted: &[String], id: &str) -> bool {
     aborted.iter().any(|text| text.split(' ').next() == Some(id))
+}
+
+/// Whether this tells that states of a vehicle are missing: no longer true once they are there.
+pub(crate) fn is_about_states_of(text: &str, id: &str) -> bool {
+    let begins = |words: &str| text.strip_prefix(words).and_then(|rest| rest.strip_prefix(id));
+    let rest = ["log of ", "there are no states of ", "the states of ", "the log of "].into_iter().find_map(begins);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with([':', ' ']))
+}
+
+/// Where the log of a participant is that could not be collected, and how it comes to the run.
+pub(crate) fn how_to_bring(who: &str, digest: u64, run: &Path) -> String {
+    let program = if who == HUB { HUB } else { "vehicle-node" };
+    format!(
+        "it is on the machine of {who} in LOGS/{digest:016x}, where LOGS is what its {program} was told by --logs (logs, if nothing); \
+         bring it here and say: mission-control report {} --logs LOGS",
+        run.display()
+    )
 }
 
 /// How late a vehicle may begin that did not begin in mid-flight \[s of wall clock\].

@@ -45,7 +45,7 @@ pub fn rehearse(mission: &Arc<Mission>, out: Option<&Path>) -> Result<(PathBuf, 
 /// What could not be flown or written.
 pub fn record(mission: &Arc<Mission>, path: &Path, mut progress: impl FnMut(Time)) -> Result<Outcome, String> {
     let broken = |error: bus::recording::RecordingError| error.to_string();
-    let mut recorder = CanonicalRecorder::create(path, &origin(mission)).map_err(broken)?;
+    let mut recorder = CanonicalRecorder::create(path, &origin(mission, None)).map_err(broken)?;
     let pending = std::cell::RefCell::new(Vec::<Row>::new());
     let mut failure = None;
     let outcome = simulate(

@@ -20,6 +20,7 @@ use common::wire::vehicle::{LogPiece, Phase};
 use common::wire::{self, GarbageCount};
 use network_emulator::hub::COLLECTOR;
 
+use crate::brought::of_one_flight;
 use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
@@ -42,6 +43,8 @@ pub struct Plan {
     pub listen: Option<Endpoint>,
     /// How mission time passes.
     pub pace: Pace,
+    /// Whether that was asked for.
+    pub pace_asked: bool,
     /// How long to wait until every vehicle of a fleet that is already up is armed.
     pub patience: Option<Duration>,
 }
@@ -194,7 +197,7 @@ fn conduct(
         collected,
         stop,
         interrupted: false,
-        pace: plan.pace,
+        pace: plan.pace_asked.then_some(plan.pace),
         joined: false,
         garbage: GarbageCount::default(),
     };
@@ -207,8 +210,7 @@ fn conduct(
 
 /// Tells the fleet that everything of the flight is here, and leaves it.
 fn dismiss(line: Line) {
-    let _ = line.send(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
-    line.close();
+    let _ = line.close_with(Plane::Mission, &wire::encode(&ToFleet::Dismiss));
 }
 
 /// Leaves a fleet that has no log of the flight at all.
@@ -242,11 +244,13 @@ fn merge_logs(
     landing: &Landing,
     ended_early: Vec<String>,
 ) -> Result<Recorded, Failure> {
-    let merged = merge(logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
+    let (logs, left_out) = of_one_flight(logs.to_vec());
+    let merged = merge(&logs, folder.join(RECORDING)).map_err(|error| Failure::Files(error.to_string()))?;
     let pace = landing.pace.unwrap_or(plan.pace);
     let cut_short = missing::cut_short(&plan.mission, landing.phase, &merged);
     let sound = landing.phase == Phase::Finished && landing.aborted.is_empty() && cut_short.is_empty();
-    let mut all: Vec<String> = landing.missing_logs().chain(ended_early).collect();
+    let missing_logs = landing.missing_logs_of(folder, plan.mission.digest);
+    let mut all: Vec<String> = missing_logs.chain(ended_early).chain(left_out).collect();
     all.extend(missing::damage(&merged));
     all.extend(missing::late_beginnings(&plan.mission, pace, &merged));
     let untold = cut_short.into_iter().filter(|(id, _)| !missing::gave_up(&landing.aborted, id));
@@ -293,6 +297,35 @@ fn not_armed(mission: &Mission, status: &FleetStatus) -> String {
     if waiting.is_empty() { String::new() } else { format!("waiting for {}", waiting.join(", ")) }
 }
 
+/// Since when messages are counted, if not from the start.
+fn counted_since(status: &FleetStatus) -> String {
+    let from = status.counted_from;
+    if from > Time::ZERO { format!(" since {:.0} s", from.secs()) } else { String::new() }
+}
+
+/// What is told to who joins a flight under way and asked for this.
+fn joining(asked: Option<Pace>) -> String {
+    let in_vain = match asked {
+        Some(Pace::Stepped) => ", and --stepped changes nothing".to_string(),
+        Some(Pace::Real { speed_up }) => format!(", and --speed-up {speed_up} changes nothing"),
+        None => String::new(),
+    };
+    format!("the flight was under way already: it goes on at the speed it was started with{in_vain}")
+}
+
+/// What a status is shown as: a quick flight is under way or over before its start was answered, and the time of a flight before
+/// is none of this one's.
+fn shown(step: Step, status: &FleetStatus, is_this_mission: bool) -> (Step, Time) {
+    let under_way = is_this_mission && status.phase == Phase::Running;
+    let over = is_this_mission && matches!(status.phase, Phase::Finished | Phase::Aborted);
+    match step {
+        Step::Contact | Step::Arming if !under_way => (step, Time::ZERO),
+        Step::Starting if under_way || over => (Step::Flying, status.now),
+        _ if is_this_mission => (step, status.now),
+        _ => (step, Time::ZERO),
+    }
+}
+
 struct ConductPort<'p> {
     line: Line,
     own: bool,
@@ -303,7 +336,8 @@ struct ConductPort<'p> {
     collected: &'p Path,
     stop: StopFlag,
     interrupted: bool,
-    pace: Pace,
+    /// How mission time was asked to pass.
+    pace: Option<Pace>,
     /// Whether it was told that the flight was under way already.
     joined: bool,
     garbage: GarbageCount,
@@ -313,6 +347,14 @@ type Ending = Result<Landing, Failure>;
 
 impl ConductPort<'_> {
     fn tell(&mut self, step: Step, status: Option<&FleetStatus>) {
+        let Some(status) = status else {
+            return self.progress.line("lost the network-emulator; looking for it");
+        };
+        let is_this_mission = status.mission == self.mission.text;
+        if step == Step::Contact && status.phase == Phase::Running && is_this_mission {
+            self.join();
+        }
+        let (step, now) = shown(step, status, is_this_mission);
         let name = match step {
             Step::Contact => "contact",
             Step::Arming => "arming",
@@ -320,20 +362,16 @@ impl ConductPort<'_> {
             Step::Flying => "flying",
             Step::Collecting | Step::Ended => "collecting",
         };
-        let Some(status) = status else {
-            return self.progress.line("lost the network-emulator; looking for it");
-        };
         let [sent, delivered, dropped, _] = status.messages;
         let message = match step {
             Step::Contact | Step::Starting => String::new(),
             Step::Arming => not_armed(&self.mission, status),
-            _ => format!("messages {sent} sent, {delivered} delivered, {dropped} dropped{}", self.away(status)),
+            _ => format!(
+                "messages{} {sent} sent, {delivered} delivered, {dropped} dropped{}",
+                counted_since(status),
+                self.away(status)
+            ),
         };
-        if step == Step::Contact && status.phase == Phase::Running && status.mission == self.mission.text {
-            self.join();
-        }
-        // The time of a mission that the fleet flew before is none of this one's.
-        let now = if status.mission == self.mission.text { status.now } else { Time::ZERO };
         self.progress.reached(name, now, &message);
     }
 
@@ -349,15 +387,8 @@ impl ConductPort<'_> {
 
     /// A flight under way has its clock already, and whoever attaches cannot give it another.
     fn join(&mut self) {
-        let wanted = match self.pace {
-            Pace::Stepped => "--stepped".to_string(),
-            Pace::Real { speed_up } => format!("--speed-up {speed_up}"),
-        };
-        let text = format!(
-            "the flight was under way already: it goes on at the speed it was started with, and {wanted} changes nothing"
-        );
         if !std::mem::replace(&mut self.joined, true) {
-            self.progress.line(&text);
+            self.progress.line(&joining(self.pace));
         }
     }
 
@@ -452,5 +483,46 @@ impl Port for ConductPort<'_> {
 
     fn closed(&mut self) -> Ending {
         Err(Failure::Unreachable("the line to the fleet is closed".to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(phase: Phase, now_s: f64) -> FleetStatus {
+        FleetStatus {
+            phase,
+            mission: String::new(),
+            now: Time::from_secs(now_s),
+            end: Time::from_secs(800.0),
+            speed: 0.5,
+            vehicles: Vec::new(),
+            collected: true,
+            pace: None,
+            messages: [0; 4],
+            counted_from: Time::ZERO,
+        }
+    }
+
+    #[test]
+    fn the_time_of_a_flight_before_is_not_shown_and_a_quick_one_is_not_starting() {
+        let (over, running) = (status(Phase::Finished, 800.0), status(Phase::Running, 30.0));
+        for step in [Step::Contact, Step::Arming] {
+            assert_eq!(shown(step, &over, true), (step, Time::ZERO));
+            assert_eq!(shown(step, &running, false), (step, Time::ZERO));
+        }
+        assert_eq!(shown(Step::Contact, &running, true), (Step::Contact, running.now));
+        assert_eq!(shown(Step::Starting, &over, true), (Step::Flying, over.now));
+        assert_eq!(shown(Step::Starting, &running, true), (Step::Flying, running.now));
+        assert_eq!(shown(Step::Starting, &status(Phase::Armed, 0.0), true), (Step::Starting, Time::ZERO));
+        assert_eq!(shown(Step::Collecting, &over, true), (Step::Collecting, over.now));
+    }
+
+    #[test]
+    fn who_joins_is_told_of_what_was_asked_for_only() {
+        assert!(joining(None).ends_with("at the speed it was started with"));
+        let faster = joining(Some(Pace::Real { speed_up: 50.0 }));
+        assert!(faster.ends_with(", and --speed-up 50 changes nothing"), "{faster}");
     }
 }

@@ -98,6 +98,7 @@ pub fn run(args: Args) -> ExitCode {
         overruns: BTreeMap::new(),
         overrun_pace: AtMostEvery::new(OVERRUN_PERIOD),
         clock: Clock::Stopped,
+        start_unix_ns: None,
         garbage: BTreeMap::new(),
         stop,
         once: args.once,
@@ -173,6 +174,8 @@ struct HubPort {
     overrun_pace: AtMostEvery,
     /// The program's clock.
     clock: Clock,
+    /// When mission time is zero, if it passes with the wall clock.
+    start_unix_ns: Option<i64>,
     /// Garbage on the mission plane, by participant; participants are bounded by the switchboard.
     garbage: BTreeMap<LineId, GarbageCount>,
     stop: StopFlag,
@@ -342,7 +345,7 @@ impl Port for HubPort {
             HubOutput::OpenLog { mission, fresh } => {
                 // What was dropped before is not of this flight.
                 self.record_overruns(false);
-                return Next::Feed(match self.logs.open(&mission.0, fresh) {
+                return Next::Feed(match self.logs.open(&mission.0, self.start_unix_ns, fresh) {
                     Ok(earlier) => HubInput::LogOpened { last: earlier.until },
                     Err(reason) => {
                         tracing::error!("{reason}");
@@ -358,11 +361,13 @@ impl Port for HubPort {
                 };
                 *clock = Clock::follow(plan);
                 self.clock = *clock;
+                self.start_unix_ns = plan.start_unix_ns();
                 return Next::Feed(HubInput::ClockStarted(plan));
             }
             HubOutput::FollowClock(plan) => {
                 *clock = Clock::follow(plan);
                 self.clock = *clock;
+                self.start_unix_ns = plan.start_unix_ns();
                 return Next::Feed(HubInput::ClockStarted(plan));
             }
             HubOutput::ReadLog { digest, file, offset } => {

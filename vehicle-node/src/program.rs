@@ -93,6 +93,7 @@ pub fn run(args: Args) -> ExitCode {
         overruns: [0; 2],
         overrun_pace: AtMostEvery::new(OVERRUN_PERIOD),
         clock: Clock::Stopped,
+        start_unix_ns: None,
         refused: None,
         recording_failed: false,
     };
@@ -119,6 +120,8 @@ struct VehiclePort {
     overrun_pace: AtMostEvery,
     /// The program's clock.
     clock: Clock,
+    /// When mission time is zero, if it passes with the wall clock.
+    start_unix_ns: Option<i64>,
     refused: Option<Refusal>,
     recording_failed: bool,
 }
@@ -198,12 +201,13 @@ impl Port for VehiclePort {
             NodeOutput::FollowClock(plan) => {
                 *clock = Clock::follow(plan);
                 self.clock = *clock;
+                self.start_unix_ns = plan.start_unix_ns();
                 return Next::Feed(NodeInput::ClockStarted);
             }
             NodeOutput::OpenLog { mission, fresh } => {
                 // What was dropped before is not of this flight.
                 self.record_overruns(false);
-                return Next::Feed(match self.logs.open(&mission.0, fresh) {
+                return Next::Feed(match self.logs.open(&mission.0, self.start_unix_ns, fresh) {
                     Ok(earlier) => NodeInput::LogOpened { last: earlier.last_state.map(Box::new) },
                     Err(reason) => {
                         tracing::error!("{}: {reason}", self.id);

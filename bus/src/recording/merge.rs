@@ -184,20 +184,29 @@ fn open_all<P: AsRef<Path>>(inputs: &[P]) -> Result<Inputs> {
             }
             opened => opened?,
         };
-        match &origin {
+        match &mut origin {
             // A file that was cut before its mission says nothing about the run, and holds no rows.
             _ if *rows.origin() == Origin::default() => {}
             None => origin = Some((rows.origin().clone(), path.as_ref().to_owned())),
+            Some((first, other)) if is_another_flight(first, rows.origin()) => {
+                let cause = Cause::OtherFlight { other: other.clone() };
+                return Err(RecordingError { place: path.as_ref().to_owned(), cause });
+            }
             Some((first, other)) if first.digest != rows.origin().digest || first.seed != rows.origin().seed => {
                 let cause = Cause::OtherMission { other: other.clone() };
                 return Err(RecordingError { place: path.as_ref().to_owned(), cause });
             }
-            Some(_) => {}
+            Some((first, _)) => first.start_unix_ns = first.start_unix_ns.or(rows.origin().start_unix_ns),
         }
         let next = rows.next().transpose()?;
         opened.push(Input { rows, next });
     }
     Ok(Inputs { origin: origin.map(|(origin, _)| origin).unwrap_or_default(), opened, left_out })
+}
+
+/// Whether two flights of a mission began at different instants. Of a file that does not say when, nothing is known.
+fn is_another_flight(one: &Origin, other: &Origin) -> bool {
+    one.digest == other.digest && one.start_unix_ns.zip(other.start_unix_ns).is_some_and(|(one, other)| one != other)
 }
 
 fn merge_in_stream<P: AsRef<Path>>(inputs: &[P], output: &Path) -> Result<Merged> {

@@ -51,6 +51,9 @@ pub struct Origin {
     pub digest: String,
     /// The seed of every random stream.
     pub seed: u64,
+    /// When mission time was zero, which tells one flight of a mission from the next \[ns of the UNIX epoch\]; `None` if it did not pass
+    /// with the wall clock.
+    pub start_unix_ns: Option<i64>,
 }
 
 /// A recording that cannot be written or read: where, and why.
@@ -80,6 +83,11 @@ pub enum Cause {
     },
     /// Files of different missions or seeds cannot be merged.
     OtherMission {
+        /// The file that it differs from.
+        other: PathBuf,
+    },
+    /// Files of different flights of a mission cannot be merged.
+    OtherFlight {
         /// The file that it differs from.
         other: PathBuf,
     },
@@ -119,6 +127,7 @@ impl fmt::Display for RecordingError {
             Cause::OtherMission { other } => {
                 write!(f, "belongs to another mission or seed than {}", other.display())
             }
+            Cause::OtherFlight { other } => write!(f, "is of another flight of the mission than {}", other.display()),
         }
     }
 }

@@ -11,7 +11,7 @@ use mcap::records::{self, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::packed::unpack;
-use super::recorder::{DIGEST, MISSION, MISSION_FILE, PACKED, SEED, SETTLED, VEHICLES};
+use super::recorder::{DIGEST, MISSION, MISSION_FILE, PACKED, SEED, SETTLED, START, VEHICLES};
 use super::topic::Topic;
 use super::{Origin, RecordingError, Result};
 
@@ -30,6 +30,8 @@ pub struct Recording {
     pub digest: String,
     /// The seed.
     pub seed: u64,
+    /// When mission time was zero \[ns of the UNIX epoch\]; `None` if it did not pass with the wall clock.
+    pub start_unix_ns: Option<i64>,
     /// Rows that mission and seed determine, in the order of the file.
     pub exact: Vec<Record>,
     /// Rows that depend on the wall clock, in the order of the file.
@@ -43,7 +45,12 @@ pub struct Recording {
 impl Recording {
     /// What the recording says about the run as a whole.
     pub fn origin(&self) -> Origin {
-        Origin { mission_toml: self.mission_toml.clone(), digest: self.digest.clone(), seed: self.seed }
+        Origin {
+            mission_toml: self.mission_toml.clone(),
+            digest: self.digest.clone(),
+            seed: self.seed,
+            start_unix_ns: self.start_unix_ns,
+        }
     }
 }
 
@@ -65,11 +72,12 @@ fn collect<R: Read>(mut rows: RowReader<R>) -> Result<Recording> {
             Row::Clock(record) => recording.clock.push(record),
         }
     }
-    let Origin { mission_toml, digest, seed } = rows.origin().clone();
+    let Origin { mission_toml, digest, seed, start_unix_ns } = rows.origin().clone();
     Ok(Recording {
         mission_toml,
         digest,
         seed,
+        start_unix_ns,
         complete: rows.is_complete(),
         damage: rows.damage().map(str::to_owned),
         ..recording
@@ -292,6 +300,7 @@ impl Contents {
                 self.origin.digest = metadata.metadata.get(DIGEST).cloned().unwrap_or_default();
                 let seed = metadata.metadata.get(SEED).and_then(|seed| seed.parse().ok());
                 self.origin.seed = seed.unwrap_or_default();
+                self.origin.start_unix_ns = metadata.metadata.get(START).and_then(|start| start.parse().ok());
             }
             // Other programs' records have numbers from 0x80 on.
             Ok(records::Record::Unknown { opcode: ..0x80, .. }) => {

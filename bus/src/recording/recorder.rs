@@ -264,8 +264,9 @@ fn start<W: Write + Seek>(writer: W, origin: &Origin) -> mcap::McapResult<Writer
         media_type: "application/toml".into(),
         data: origin.mission_toml.as_bytes().into(),
     })?;
-    let metadata =
+    let mut metadata =
         BTreeMap::from([(DIGEST.to_owned(), origin.digest.clone()), (SEED.to_owned(), origin.seed.to_string())]);
+    metadata.extend(origin.start_unix_ns.map(|start| (START.to_owned(), start.to_string())));
     mcap.write_metadata(&Metadata { name: MISSION.into(), metadata })?;
     mcap.flush()?;
     Ok(mcap)
@@ -294,6 +295,8 @@ pub(super) const MISSION: &str = "mission";
 pub(super) const DIGEST: &str = "digest";
 /// Key of the seed in the metadata record.
 pub(super) const SEED: &str = "seed";
+/// Key of the instant of mission time zero in the mission's metadata.
+pub(super) const START: &str = "start_unix_ns";
 
 #[cfg(test)]
 mod tests {

@@ -9,7 +9,7 @@ use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, Record, Row, Sp
 use super::Origin;
 
 pub(super) fn origin() -> Origin {
-    Origin { mission_toml: "name = \"tëst\"\n".into(), digest: "c0ffee".into(), seed: 7 }
+    Origin { mission_toml: "name = \"tëst\"\n".into(), digest: "c0ffee".into(), seed: 7, start_unix_ns: None }
 }
 
 pub(super) fn state(t_ns: i64, vehicle: &str, xi: f64) -> Row {

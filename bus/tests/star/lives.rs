@@ -151,6 +151,19 @@ fn a_hub_that_closes_says_good_bye_after_its_last_word() {
     drop(line);
 }
 
+#[test]
+fn a_hub_that_ends_on_the_last_word_is_not_missed() {
+    let (mut hub, hub_events) = hub();
+    let (line, events, number) = joined(&hub, &hub_events, "auv1");
+    let hub = std::thread::spawn(move || {
+        assert_eq!(expect_up(&hub_events, number), (Plane::Mission, b"that is all".to_vec()));
+        hub.close();
+    });
+    line.close_with(Plane::Mission, b"that is all").expect("connected");
+    hub.join().expect("it heard it");
+    assert_eq!(recv_until(&events, Some(Instant::now() + PATIENCE)), Wake::Closed, "not Lost before it");
+}
+
 /// If a send to the frozen one waited for it, the hub would be held up until it is held for dead, and its `Left` would
 /// come before the living one's answers.
 #[test]
@@ -223,6 +236,7 @@ fn a_port_in_use_is_one_clear_error() {
     let error = Switchboard::open(SwitchboardConfig::new(endpoint.clone())).expect_err("in use");
     assert_eq!(error, Error::PortInUse(endpoint.clone()));
     assert!(error.to_string().contains(&format!("{endpoint} is already in use")), "{error}");
+    assert!(error.to_string().contains("another port with --listen"), "{error}");
     let (hub, _events) = hub();
     let second = Switchboard::open(SwitchboardConfig::new(hub.endpoint().clone())).expect_err("in use");
     assert_eq!(second, Error::PortInUse(hub.endpoint().clone()));

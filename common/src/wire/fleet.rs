@@ -116,4 +116,6 @@ pub struct FleetStatus {
     pub pace: Option<Pace>,
     /// Messages taken, delivered, dropped and in flight, over all links.
     pub messages: [u64; 4],
+    /// From when on these are counted: zero, or when the network-emulator came back that was killed under way.
+    pub counted_from: Time,
 }

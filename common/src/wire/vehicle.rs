@@ -24,6 +24,14 @@ impl ClockPlan {
     /// How many mission seconds there may be in one of wall clock.
     pub const SPEED_UPS: RangeInclusive<f64> = 0.001..=1000.0;
 
+    /// When mission time is zero \[ns of the UNIX epoch\], if it passes with the wall clock.
+    pub fn start_unix_ns(self) -> Option<i64> {
+        match self {
+            ClockPlan::Real { epoch_unix_ns, .. } => Some(epoch_unix_ns),
+            ClockPlan::Stepped => None,
+        }
+    }
+
     /// Whether it is one by which anybody can fly.
     pub fn is_sound(self) -> bool {
         match self {

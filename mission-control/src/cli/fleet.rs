@@ -62,7 +62,8 @@ fn as_json(status: &FleetStatus) -> serde_json::Value {
     serde_json::json!({
         "phase": status.phase.as_str(), "now_s": status.now.secs(), "end_s": status.end.secs(),
         "speed": status.speed, "vehicles": vehicles,
-        "messages": {"sent": sent, "delivered": delivered, "dropped": dropped, "in_flight": in_flight},
+        "messages": {"sent": sent, "delivered": delivered, "dropped": dropped, "in_flight": in_flight,
+            "since_s": status.counted_from.secs()},
         "monitor": mission.and_then(|mission| theory::so_far(&mission, status)),
     })
 }

@@ -12,6 +12,7 @@ use common::wire::vehicle::{ClockPlan, Phase};
 
 use super::mission::{load, print_theory, warn};
 use super::{End, Ended};
+use crate::console::error_in_words;
 use crate::results::{ClockVerdict, MessageCounts, Summary};
 use crate::run::{Failure, Plan, fly};
 use crate::sweep::plan;
@@ -32,9 +33,9 @@ pub(super) struct RunArgs {
     /// Where the own network-emulator listens (default: tcp/127.0.0.1:7447, or a free port if that is taken)
     #[arg(long, value_name = "tcp/HOST:PORT", conflicts_with = "attach")]
     listen: Option<Endpoint>,
-    /// Mission seconds per second of wall clock
-    #[arg(long, value_name = "FACTOR", default_value = "1", conflicts_with = "stepped")]
-    speed_up: f64,
+    /// Mission seconds per second of wall clock (default: 1)
+    #[arg(long, value_name = "FACTOR", conflicts_with = "stepped", value_parser = speed_up, allow_negative_numbers = true)]
+    speed_up: Option<f64>,
     /// Advance in lock step, as fast as the processes can; equals `simulate` bit for bit
     #[arg(long)]
     stepped: bool,
@@ -44,6 +45,12 @@ pub(super) struct RunArgs {
     /// JSON for a pipe
     #[arg(long)]
     json: bool,
+}
+
+/// A speed-up that can be flown.
+fn speed_up(text: &str) -> Result<f64, String> {
+    let flown = text.parse::<f64>().ok().filter(|factor| ClockPlan::SPEED_UPS.contains(factor));
+    flown.ok_or_else(|| "allowed: 0.001 to 1000".to_string())
 }
 
 /// An endpoint after `--attach`, which takes one or none: what follows it may be meant as the mission.
@@ -84,17 +91,15 @@ fn changed(mission: Arc<Mission>, sets: &[String], seed: Option<u64>) -> Result<
 
 pub(super) fn run(args: RunArgs) -> Ended {
     let mission = load(&args.mission)?;
-    if !ClockPlan::SPEED_UPS.contains(&args.speed_up) {
-        return Err(End(2, format!("--speed-up: found {:e}; allowed: 0.001 to 1000", args.speed_up)));
-    }
     warn(&mission, &theory::rows(&mission, None));
-    let pace = if args.stepped { Pace::Stepped } else { Pace::Real { speed_up: args.speed_up } };
+    let pace = if args.stepped { Pace::Stepped } else { Pace::Real { speed_up: args.speed_up.unwrap_or(1.0) } };
     let plan = Plan {
         mission: mission.clone(),
         out: args.out,
         attach: args.attach,
         listen: args.listen,
         pace,
+        pace_asked: args.stepped || args.speed_up.is_some(),
         patience: args.patience,
     };
     match fly(&plan) {
@@ -177,7 +182,7 @@ fn tell_messages(m: &MessageCounts) {
 fn coordination_at_end(summary: &Summary) -> String {
     let coordination = &summary.fleet.coordination;
     let value = match coordination.last.is_finite() {
-        true => format!("{:.2e}", coordination.last),
+        true => error_in_words(coordination.last_norm(), coordination.last),
         false => "beyond what can be told".to_string(),
     };
     match (coordination.last_s, coordination.early(summary.duration_s)) {

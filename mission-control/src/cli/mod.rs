@@ -132,7 +132,7 @@ enum What {
     )]
     Speed {
         /// The speed v_L (units of xi per s)
-        #[arg(allow_negative_numbers = true)]
+        #[arg(allow_negative_numbers = true, value_parser = number)]
         speed: f64,
         #[command(flatten)]
         fleet: FleetArgs,
@@ -158,11 +158,19 @@ enum What {
     },
     /// Make summary, figures and report of a run again; its recording too, if mission-control was killed
     #[command(
-        after_help = "Example:\n  mission-control report runs/auv-helix-2026-01-31-120000\n\nExit codes: 0 made, 4 files cannot be read or written."
+        after_help = "A vehicle that was out of reach when the logs were collected keeps its own in LOGS/DIGEST, where LOGS is what its\n\
+        vehicle-node was told by --logs. Bring the folder here and name it; the recording is merged again.\n\n\
+        Example:\n  mission-control report runs/auv-helix-2026-01-31-120000\n  \
+        mission-control report runs/auv-helix-2026-01-31-120000 --logs auv3-logs\n\n\
+        Exit codes: 0 made, 4 files cannot be read or written, or no log could be added."
     )]
     Report {
         /// The run folder
         run: PathBuf,
+        /// First add the logs that the run lacks from this folder (as --logs of vehicle-node names it), or this log; those of
+        /// another mission or flight are refused
+        #[arg(long, value_name = "DIR")]
+        logs: Option<PathBuf>,
     },
     /// Write a run's recording in another format
     #[command(
@@ -266,7 +274,7 @@ fn run(what: What) -> Ended {
         What::Speed { speed, fleet } => fleet::speed(speed, &fleet.attach),
         What::Status { json, fleet } => fleet::status(json, &fleet.attach),
         What::Stop { fleet } => fleet::stop(&fleet.attach),
-        What::Report { run } => recordings::report(&run),
+        What::Report { run, logs } => recordings::report(&run, logs.as_deref()),
         What::Export { run, format, out } => recordings::export(&run, format, out),
         What::Diff { a, b } => recordings::diff(&a, &b),
         What::Recover { recording, out } => recordings::recover(&recording, out),
@@ -278,8 +286,34 @@ fn run(what: What) -> Ended {
     }
 }
 
+/// A number, as given on a command line.
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "allowed: a number, such as 0.4".to_string())
+}
+
 /// A word of a command as a shell takes it.
 fn quoted(word: String) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
     if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a wrong command.
+    fn refused(words: &[&str]) -> String {
+        let words = ["mission-control"].iter().chain(words);
+        Cli::try_parse_from(words).map(|_| ()).expect_err("wrong").to_string()
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_told_what_is_allowed() {
+        let speed = refused(&["speed", "abc"]);
+        assert!(speed.contains("'abc'") && speed.contains("allowed: a number, such as 0.4"), "{speed}");
+        for factor in ["0", "abc", "-1", "1001", "nan"] {
+            let said = refused(&["run", "m.toml", "--speed-up", factor]);
+            assert!(said.contains(&format!("'{factor}'")) && said.contains("allowed: 0.001 to 1000"), "{said}");
+        }
+    }
 }

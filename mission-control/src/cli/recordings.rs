@@ -7,8 +7,8 @@ use clap::ValueEnum;
 use common::mission::Mission;
 
 use super::{End, Ended};
-use crate::folder;
 use crate::results::{compare, export_csv, network_section};
+use crate::{brought, folder};
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Format {
@@ -18,12 +18,14 @@ pub(super) enum Format {
     Network,
 }
 
-pub(super) fn report(run: &Path) -> Ended {
+pub(super) fn report(run: &Path, logs: Option<&Path>) -> Ended {
     if run.is_file() {
         let reason = format!("{} is a file; allowed: the folder of a run, for the report goes there", run.display());
         return Err(End(4, reason));
     }
-    for text in folder::salvage(run).map_err(|error| End(4, error))?.unwrap_or_default() {
+    let salvaged = folder::salvage(run).map_err(|error| End(4, error))?.unwrap_or_default();
+    let added = logs.map(|logs| brought::add(run, logs)).transpose().map_err(|error| End(4, error))?;
+    for text in salvaged.into_iter().chain(added.unwrap_or_default()) {
         bus::remark!("{text}");
     }
     folder::report(run).map_err(|error| End(4, error))?;
@@ -89,8 +91,17 @@ pub(super) fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
 
 /// Makes the recording of a run whose mission-control was killed, of the logs of its processes.
 fn recover_run(run: &Path, out: Option<PathBuf>) -> Ended {
+    let name = run.display();
+    if !run.join(folder::MISSION).exists() {
+        let text =
+            format!("{name} is no run folder: it has no {}; allowed: a run folder, or one recording", folder::MISSION);
+        return Err(End(4, text));
+    }
     if out.is_some() {
-        return Err(End(2, "--out: found with a run folder; allowed: with a recording".to_string()));
+        let text = format!(
+            "--out: found with {name}, a run folder, whose recording is made in it; allowed: with one recording"
+        );
+        return Err(End(2, text));
     }
     let recording = run.join(folder::RECORDING);
     match folder::salvage(run).map_err(|error| End(4, error))? {

@@ -11,7 +11,8 @@ const COORDINATION_THRESHOLD: f64 = 1e-2;
 /// Time series in the summary have at most about this many samples.
 const SERIES_SAMPLES: usize = 600;
 
-/// How the fleet agreed. x_i = ξ_i − h_i, the coordination state with the pattern removed.
+/// How the fleet agreed. x_i = ξ_i − h_i, the coordination state with the pattern removed. What was never measured is NaN, `null` in
+/// JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CoordinationSummary {
     /// Unit of all values.
@@ -63,9 +64,9 @@ impl CoordinationSummary {
         let steady = steady_part(t_s, facts);
         let mut summary = CoordinationSummary {
             unit: facts.xi_unit.clone(),
-            initial: spread.first().copied().unwrap_or(0.0),
+            initial: spread.first().copied().unwrap_or(f64::NAN),
             largest: peak,
-            last: spread.last().copied().unwrap_or(0.0),
+            last: spread.last().copied().unwrap_or(f64::NAN),
             last_s: t_s.last().copied(),
             steady_rms: rms(spread[steady..].iter().copied()),
             settled_s: settling_time(t_s, &spread, SETTLED_PART * peak),
@@ -85,6 +86,11 @@ impl CoordinationSummary {
         let comparable = self.fit.filter(|fit| fit.on_paths).zip(guaranteed_rate);
         let least = |guaranteed: f64| least_rate.map_or(guaranteed, |least| least.min(guaranteed));
         self.at_least_guaranteed = comparable.map(|(fit, guaranteed)| fit.rate >= (1.0 - FIT_PART) * least(guaranteed));
+    }
+
+    /// ‖e‖ = ‖(I − 11ᵀ/n)x‖ at the instant of the last value.
+    pub fn last_norm(&self) -> f64 {
+        self.series.norm.last().copied().unwrap_or(f64::NAN)
     }
 
     /// The instant of the last value, if that is not the end of the run: a vehicle was away from then on.

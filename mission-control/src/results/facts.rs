@@ -20,8 +20,12 @@ pub struct Facts {
     pub links: Vec<(String, String)>,
     /// Size of one message on the air, as the medium packs it, of vehicles that have no size of their own \[bytes\].
     pub message_bytes: u64,
-    /// Length of the mission \[s\].
+    /// Length of the mission, as far as it was flown \[s\].
     pub duration_s: f64,
+    /// Length that was planned \[s\].
+    pub planned_s: f64,
+    /// Formation speeds that were commanded under way: from when on \[s\], and what \[units of ξ per s\].
+    pub commanded: Vec<(f64, f64)>,
     /// Control period \[s\].
     pub control_period_s: f64,
     /// A neighbour leaves N_i after this silence \[s\]; never, without.

@@ -78,6 +78,9 @@ pub(super) fn optional(value: Option<f64>, unit: &str) -> String {
 
 /// A part of one, in per cent.
 pub(super) fn percent(part: f64) -> String {
+    if !part.is_finite() {
+        return number(part);
+    }
     format!("{}&nbsp;%", number((part * 1000.0).round() / 10.0))
 }
 

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Facts;
 use super::network::Network;
-use super::statistics::{largest, quantile, sorted};
+use super::statistics::{quantile, sorted};
 
 /// How many messages there were, and what became of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -163,7 +163,7 @@ pub(super) fn links(exact: &[Record], facts: &Facts, network: &Network) -> Vec<L
             from: from.to_owned(),
             to: to.to_owned(),
             up_fraction: if duration > 0.0 { 1.0 - down_s / duration } else { 1.0 },
-            longest_outage_s: largest(down.iter().map(|(from, to)| to - from)),
+            longest_outage_s: down.iter().map(|(from, to)| to - from).fold(0.0, f64::max),
             ..summary
         }
     })
@@ -201,20 +201,34 @@ fn ledger(rows: &[&MessageRow], message_bytes: u64) -> LinkSummary {
     }
 }
 
-/// Number of transmissions by sender: a message to several receivers goes on the air once, and one that found no place in its
-/// sender's queue, or still waited there at the end, never.
-pub(super) fn transmissions(exact: &[Record]) -> BTreeMap<&str, u64> {
-    let mut sent: Vec<(&str, i64, u64)> = exact
-        .iter()
-        .filter_map(|record| match record {
-            Record::Message(row) if was_on_air(row) => Some((&*row.from, row.sent_ns, row.seq)),
+/// What one vehicle said.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Said {
+    /// Number of transmissions: a message to several receivers goes on the air once, and one that found no place in its sender's
+    /// queue, or still waited there at the end, never.
+    pub(super) transmissions: u64,
+    /// When the network last took a message of it \[s\].
+    pub(super) last_s: Option<f64>,
+}
+
+/// What each vehicle said, by its name.
+pub(super) fn said(exact: &[Record]) -> BTreeMap<&str, Said> {
+    let rows = || {
+        exact.iter().filter_map(|record| match record {
+            Record::Message(row) => Some(row),
             _ => None,
         })
-        .collect();
+    };
+    let mut sent: Vec<(&str, i64, u64)> =
+        rows().filter(|row| was_on_air(row)).map(|row| (&*row.from, row.sent_ns, row.seq)).collect();
     sent.sort_unstable();
     sent.dedup();
-    let mut by_sender = BTreeMap::new();
-    sent.iter().for_each(|(from, ..)| *by_sender.entry(*from).or_default() += 1);
+    let mut by_sender: BTreeMap<&str, Said> = BTreeMap::new();
+    sent.iter().for_each(|(from, ..)| by_sender.entry(*from).or_default().transmissions += 1);
+    for row in rows() {
+        let last_s = &mut by_sender.entry(&*row.from).or_default().last_s;
+        *last_s = Some(last_s.unwrap_or(0.0).max(row.sent_ns as f64 / 1e9));
+    }
     by_sender
 }
 
@@ -241,7 +255,7 @@ mod tests {
         assert!(link.balanced);
         assert_eq!((link.messages.sent, link.messages.delivered, link.delivered_bytes), (6, 2, 20));
         assert_eq!(link.delay, Some(Spread { median: 5.0, p99: 5.0, max: 5.0 }));
-        assert_eq!(transmissions(&rows).values().sum::<u64>(), 6);
+        assert_eq!(said(&rows).values().map(|said| said.transmissions).sum::<u64>(), 6);
     }
 
     #[test]
@@ -276,7 +290,7 @@ mod tests {
             row(3, "2", Fate::InFlight, 9),
             row(4, "2", Fate::InFlight, 0),
         ];
-        assert_eq!(transmissions(&rows).get("1"), Some(&3));
+        assert_eq!(said(&rows).get("1").map(|said| said.transmissions), Some(3));
     }
 
     #[test]

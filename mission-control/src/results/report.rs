@@ -96,10 +96,8 @@ fn header(page: &mut String, report: &Report<'_>) {
     let (good, sentences) = verdict(report);
     let class = if good { "good" } else { "attention" };
     let _ = writeln!(page, "<p class=\"verdict {class}\">{sentences}</p>");
-    let vehicles = summary.vehicles.len();
-    let plural = if vehicles == 1 { "" } else { "s" };
     let entries = [
-        ("flown", format!("{vehicles} vehicle{plural}, {} s", number(summary.duration_s))),
+        ("flown", flown(summary)),
         ("formation speed", optional(summary.fleet.formation_speed, "/s")),
         ("control period", format!("{} s", number(facts.control_period_s))),
         ("seed", summary.seed.to_string()),
@@ -110,6 +108,18 @@ fn header(page: &mut String, report: &Report<'_>) {
         let _ = write!(page, "<div><dt>{name}</dt><dd>{value}</dd></div>");
     }
     page.push_str("</dl>\n</header>\n");
+}
+
+/// By how many vehicles, and how long; by how many of them to the end, if not all were.
+fn flown(summary: &Summary) -> String {
+    let (vehicles, lost) = (summary.vehicles.len(), summary.fleet.lost.len() + summary.fleet.aborted.len());
+    let plural = if vehicles == 1 { "" } else { "s" };
+    let to_the_end = match vehicles.saturating_sub(lost) {
+        whole if whole == vehicles => String::new(),
+        0 => ", none to the end".to_owned(),
+        whole => format!(", {whole} to the end"),
+    };
+    format!("{vehicles} vehicle{plural}{to_the_end}, {} s", number(summary.duration_s))
 }
 
 fn theory(page: &mut String, rows: &[TheoryRow]) {
@@ -446,6 +456,49 @@ mod tests {
         }
     }
 
+    fn page_of(recording: &bus::recording::Recording, facts: &Facts) -> String {
+        report(&Report {
+            facts,
+            summary: &summarise(recording, facts),
+            clock: &summarise_clock(recording),
+            figures: &[],
+            theory: &[],
+            notes: &[],
+            reproduce: &[],
+            mission_toml: "",
+        })
+    }
+
+    #[test]
+    fn the_head_says_who_was_lost_and_of_whom_the_numbers_are() {
+        use common::record::Record;
+        let (mut recording, facts) = (fleet(true), facts(true));
+        let after = |record: &Record| match record {
+            Record::State(row) => *row.vehicle == *"v3",
+            Record::Message(row) => *row.from == *"v3" && row.sent_ns > 200_000_000_000,
+            _ => false,
+        };
+        recording.exact.retain(|record| !after(record));
+        let page = page_of(&recording, &facts);
+        let said = "<strong>v3 was lost at 200 s</strong>, and there is no log of it: the numbers are of v1 and v2.";
+        assert!(page.contains(said) && page.contains("verdict attention"), "{page}");
+        assert!(page.contains("3 vehicles, 2 to the end, 400 s"));
+        let row = page.lines().find(|line| line.starts_with("<tr><td>v3</td>")).expect("a row");
+        assert!(row.contains("<td>–</td>") && !row.contains("<td>0</td>") && !row.contains('%'), "{row}");
+    }
+
+    #[test]
+    fn the_head_says_that_a_flight_was_stopped_and_its_speed_changed() {
+        use common::record::{ClockRecord, NoteRow};
+        let mut recording = fleet(true);
+        let (text, source) = ("flight ended: stopped by mission-control".to_owned(), "network-emulator".to_owned());
+        recording.clock.push(ClockRecord::Note(NoteRow { t_ns: 400_000_000_000, source, text, count: 1 }));
+        let facts = Facts { planned_s: 800.0, commanded: vec![(60.0, 0.4)], ..facts(true) };
+        let page = page_of(&recording, &facts);
+        assert!(page.contains("<strong>Stopped by mission-control</strong> at 400 of 800 s."), "{page}");
+        assert!(page.contains("v_L was changed under way to 0.4 /s at 60 s.") && page.contains("verdict attention"));
+    }
+
     #[test]
     fn a_number_that_is_not_of_the_end_has_its_instant() {
         let (mut recording, facts) = (fleet(true), facts(true));
@@ -467,5 +520,7 @@ mod tests {
         assert!(page.contains(&format!("at {} s, when all were last recorded", number(at))), "{at}");
         assert!(page.contains("verdict attention"));
         assert!(page.contains("v2 recorded nothing after "));
+        // It was heard to the end: its log was cut, not the vehicle lost.
+        assert!(page.contains("<strong>The log of v2 ends at 100 s</strong>"), "{page}");
     }
 }

@@ -164,20 +164,20 @@ pub(crate) fn quantile(ascending: &[f64], q: f64) -> Option<f64> {
     ascending.get(rank.saturating_sub(1).min(ascending.len().saturating_sub(1))).copied()
 }
 
-/// Root of the mean square; 0 if there are no values.
+/// Root of the mean square; NaN if there are no values, for no number is made of nothing.
 pub(crate) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|value| value * value)).sqrt()
 }
 
-/// The mean; 0 if there are no values.
+/// The mean; NaN if there are no values.
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
-    if count == 0 { 0.0 } else { sum / count as f64 }
+    sum / count as f64
 }
 
-/// The largest value; 0 if there are no values (for magnitudes, which are never negative).
+/// The largest value; NaN if there are no values.
 pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(0.0, f64::max)
+    values.into_iter().fold(f64::NAN, f64::max)
 }
 
 #[cfg(test)]

@@ -9,9 +9,10 @@ use serde::Serialize;
 use super::Facts;
 use super::coordination::CoordinationSummary;
 use super::decay::Decay;
-use super::links::{LinkSummary, MessageCounts, links, transmissions};
+use super::links::{LinkSummary, MessageCounts, Said, links, said};
+use super::loss::{Loss, losses};
 use super::network::{Connectivity, Network};
-use super::series::{Coordination, Track, speeds, tracks};
+use super::series::{Coordination, Track, is_early, speeds, tracks};
 use super::statistics::{largest, mean};
 use super::vehicle::VehicleSummary;
 
@@ -65,6 +66,9 @@ pub struct FleetSummary {
     pub absences: Vec<Absence>,
     /// The connectivity before the first of these, if there is one.
     pub connectivity_before: Option<Connectivity>,
+    /// Vehicles of which nothing is known up to the end, although they did not give up.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<Loss>,
     /// Which vehicles gave up, and why.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub aborted: Vec<String>,
@@ -75,7 +79,7 @@ pub struct FleetSummary {
 pub struct Absence {
     /// The vehicle.
     pub vehicle: String,
-    /// Its last row before \[s\].
+    /// Its last row before; its last word, if there is no log of it \[s\].
     pub from_s: f64,
     /// Its next row, or the end \[s\].
     pub to_s: f64,
@@ -104,10 +108,10 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
     let coordination = Coordination::of(&tracks, facts);
     let network = Network::of(exact, facts);
     let links = links(exact, facts, &network);
-    let said = transmissions(exact);
+    let said = said(exact);
     let vehicles: Vec<VehicleSummary> =
         tracks.iter().map(|track| VehicleSummary::of(track, &tracks, facts, &said)).collect();
-    let absences = absences(&tracks, facts);
+    let absences = absences(&tracks, &vehicles, facts);
     let first_absence = absences.first().map(|absence| absence.from_s);
     let present = || vehicles.iter().filter(|vehicle| vehicle.rows > 0);
     let fleet = FleetSummary {
@@ -116,11 +120,16 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         formation_speed: speeds(exact).last().map(|row| row.speed),
         formation_speed_at_the_end: facts.formation_speed_at_the_end,
         path_error_final_m: largest(present().map(|vehicle| vehicle.path_error_final_m)),
-        on_path_s: present().map(|vehicle| vehicle.on_path_s).collect::<Option<Vec<f64>>>().map(largest),
+        on_path_s: present()
+            .map(|vehicle| vehicle.on_path_s)
+            .collect::<Option<Vec<f64>>>()
+            .map(largest)
+            .filter(|at| at.is_finite()),
         messages: totals(&links, &said, facts),
         connectivity: network.connectivity_heard(exact, facts),
         connectivity_before: first_absence.and_then(|at| network.until(at).connectivity_heard(exact, facts)),
         absences,
+        lost: losses(&vehicles, facts),
         aborted: facts.aborted.clone(),
         coordination: CoordinationSummary::of(&coordination, facts, Decay::of(&coordination, exact, facts).fit),
     };
@@ -146,10 +155,16 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
 /// A vehicle that records nothing for this many control periods, or for two and a half times as long as usual, is not there.
 const SILENT_PERIODS: f64 = 10.5;
 
-/// The times in which vehicles recorded nothing.
-fn absences(tracks: &[Track<'_>], facts: &Facts) -> Vec<Absence> {
+/// The times in which vehicles recorded nothing. Of one without a log it is known when it was last heard, if it ever was.
+fn absences(tracks: &[Track<'_>], vehicles: &[VehicleSummary], facts: &Facts) -> Vec<Absence> {
     let mut absences = Vec::new();
-    for track in tracks {
+    for (track, vehicle) in tracks.iter().zip(vehicles) {
+        if track.rows.is_empty() {
+            let last_s = vehicle.last_heard_s.filter(|last_s| is_early(*last_s, facts.duration_s));
+            let silent = |from_s| Absence { vehicle: track.id.to_owned(), from_s, to_s: facts.duration_s };
+            absences.extend(last_s.map(silent));
+            continue;
+        }
         let times: Vec<f64> = track.rows.iter().map(|row| row.t_ns as f64 / 1e9).collect();
         let mut usual: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         usual.sort_by(f64::total_cmp);
@@ -163,12 +178,12 @@ fn absences(tracks: &[Track<'_>], facts: &Facts) -> Vec<Absence> {
     absences
 }
 
-fn totals(links: &[LinkSummary], said: &BTreeMap<&str, u64>, facts: &Facts) -> MessageTotals {
+fn totals(links: &[LinkSummary], said: &BTreeMap<&str, Said>, facts: &Facts) -> MessageTotals {
     MessageTotals {
         counts: MessageCounts::over(links),
-        transmissions: said.values().sum(),
+        transmissions: said.values().map(|said| said.transmissions).sum(),
         message_bytes: facts.message_bytes,
-        bytes_on_air: said.iter().map(|(id, said)| said * facts.bytes_of(id)).sum(),
+        bytes_on_air: said.iter().map(|(id, said)| said.transmissions * facts.bytes_of(id)).sum(),
         balanced: links.iter().all(|link| link.balanced),
     }
 }
@@ -285,12 +300,40 @@ mod tests {
     fn an_empty_or_cut_recording_is_summarised_with_a_warning() {
         let summary = summarise(&Recording::default(), &facts(true));
         assert_eq!(summary.warnings.len(), 4, "{:?}", summary.warnings);
-        assert!(serde_json::to_string(&summary).expect("serialises").contains("\"steady_speed\":0.0"));
+        assert!(serde_json::to_string(&summary).expect("serialises").contains("\"steady_speed\":null"));
         let mut lacking = fleet(true);
         lacking.exact.retain(|record| !matches!(record, Record::Message(row) if row.seq == 7 && *row.to == *"v2"));
         let summary = summarise(&lacking, &facts(true));
         assert!(!summary.fleet.messages.balanced);
         assert_eq!(summary.warnings.len(), 2, "{:?}", summary.warnings);
+    }
+
+    #[test]
+    fn no_number_is_made_of_no_rows() {
+        let mut recording = fleet(true);
+        let is_gone = |record: &Record| match record {
+            Record::State(row) => *row.vehicle == *"v3",
+            Record::Message(row) => *row.from == *"v3" && row.sent_ns > 200_000_000_000,
+            _ => false,
+        };
+        recording.exact.retain(|record| !is_gone(record));
+        let summary = summarise(&recording, &facts(true));
+        let json = serde_json::to_value(&summary).expect("serialises");
+        let counted = ["id", "path", "pattern_offset", "rows", "last_heard_s", "predicted_along_bias_m"];
+        for (name, value) in json["vehicles"][2].as_object().expect("numbers") {
+            let is_known = counted.contains(&name.as_str()) || name == "messages_said" || name == "bytes_on_air";
+            assert_eq!(value.is_null(), !is_known, "{name}: {value}");
+        }
+        assert_eq!(summary.vehicles[2].last_heard_s, Some(200.0));
+        // What is known of when it fell silent, in place of the whole flight.
+        let silent = Absence { vehicle: "v3".into(), from_s: 200.0, to_s: 400.0 };
+        assert_eq!(summary.fleet.absences, [silent]);
+        let lost = Loss { vehicle: "v3".into(), recorded_until_s: None, heard_until_s: Some(200.0) };
+        assert_eq!(summary.fleet.lost, [lost]);
+        assert!((summary.fleet.steady_speed - 0.5).abs() < 1e-3, "of the others");
+        // Of a vehicle that was never heard either, nobody knows since when.
+        recording.exact.retain(|record| !matches!(record, Record::Message(row) if *row.from == *"v3"));
+        assert_eq!(summarise(&recording, &facts(true)).fleet.absences, []);
     }
 
     #[test]

@@ -7,13 +7,15 @@ use common::time::Time;
 use serde::Serialize;
 
 use super::Facts;
+use super::links::Said;
 use super::series::{Track, is_early, steady_part};
 use super::statistics::{SETTLED_PART, largest, mean, rms, settling_time};
 
 /// A vehicle counts as on its path when its path-following error stays below this \[m\].
 pub(super) const PATH_THRESHOLD_M: f64 = 0.1;
 
-/// The numbers of one vehicle. "Steady" is the last fifth of its rows, in whole periods of the network.
+/// The numbers of one vehicle. "Steady" is the last fifth of its rows, in whole periods of the network. What would be made of no
+/// rows is NaN, `null` in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VehicleSummary {
     /// Its name.
@@ -26,6 +28,8 @@ pub struct VehicleSummary {
     pub rows: u64,
     /// Instant of the last of them \[s\].
     pub last_s: Option<f64>,
+    /// When the network last took a message of it \[s\].
+    pub last_heard_s: Option<f64>,
     /// x_i − x_1 at the end.
     pub coordination_final: f64,
     /// Mean rate of ξ in the steady part \[units of ξ per s\].
@@ -65,12 +69,12 @@ pub struct VehicleSummary {
 }
 
 impl VehicleSummary {
-    /// The numbers of the vehicle with this track among all; `said` is how many messages each put on the air.
+    /// The numbers of the vehicle with this track among all; `said` is what each put on the air.
     pub(super) fn of(
         track: &Track<'_>,
         all: &[Track<'_>],
         facts: &Facts,
-        said: &BTreeMap<&str, u64>,
+        said: &BTreeMap<&str, Said>,
     ) -> VehicleSummary {
         let rows = &track.rows;
         let t_s: Vec<f64> = rows.iter().map(|row| row.t_ns as f64 / 1e9).collect();
@@ -83,7 +87,7 @@ impl VehicleSummary {
         let h = |track: &Track<'_>, row: &StateRow| track.pattern.at(Time::from_nanos(row.t_ns)).h;
         let removed = |track: &Track<'_>| track.rows.last().map(|row| row.xi - h(track, row));
         let first = all.iter().find_map(removed);
-        let messages_said = said.get(track.id).copied().unwrap_or(0);
+        let own = said.get(track.id).copied().unwrap_or_default();
         let planned = facts.vehicles.iter().find(|vehicle| vehicle.id == track.id);
         VehicleSummary {
             id: track.id.to_owned(),
@@ -91,18 +95,19 @@ impl VehicleSummary {
             pattern_offset: track.pattern.constant,
             rows: rows.len() as u64,
             last_s: t_s.last().copied(),
-            coordination_final: removed(track).zip(first).map_or(0.0, |(own, first)| own - first),
+            last_heard_s: own.last_s,
+            coordination_final: removed(track).zip(first).map_or(f64::NAN, |(own, first)| own - first),
             steady_speed: match (steady.first(), steady.last()) {
                 // The mean rate of ξ − h exactly, not the mean of samples of the rate.
                 (Some(a), Some(b)) if b.t_ns > a.t_ns => {
                     (b.xi - a.xi - (h(track, b) - h(track, a))) / ((b.t_ns - a.t_ns) as f64 / 1e9)
                 }
-                _ => rows.last().map_or(0.0, |row| row.xi_rate),
+                _ => rows.last().map_or(f64::NAN, |row| row.xi_rate),
             },
             steady_speed_mps: mean(steady.iter().map(|row| row.speed_mps)),
             speed_error_rms: rms(steady.iter().map(|row| row.xi_rate - row.v_ref)),
             speed_error_max: largest(steady.iter().map(|row| (row.xi_rate - row.v_ref).abs())),
-            path_error_final_m: errors.last().copied().unwrap_or(0.0),
+            path_error_final_m: errors.last().copied().unwrap_or(f64::NAN),
             path_error_largest_m: peak,
             path_error_after_settling_m: largest(errors[settled_index..].iter().copied()),
             path_error_rms_m: rms(errors[steady_index..].iter().copied()),
@@ -113,8 +118,8 @@ impl VehicleSummary {
             cross_rms_m: rms(steady.iter().map(|row| row.e_cross_m)),
             heading_rms_rad: rms(steady.iter().map(|row| row.psi_e_rad)),
             alone_fraction: mean(rows.iter().map(|row| f64::from(u8::from(row.neighbours == 0)))),
-            messages_said,
-            bytes_on_air: messages_said * facts.bytes_of(track.id),
+            messages_said: own.transmissions,
+            bytes_on_air: own.transmissions * facts.bytes_of(track.id),
         }
     }
 

@@ -1,8 +1,11 @@
 //! The verdict at the head of the report: whether all is well, and what happened in a sentence or two.
 
-use super::html::number;
+use network_emulator::hub::ENDED;
+
+use super::html::{escape, number};
+use super::series::is_early;
 use super::vehicle::PATH_THRESHOLD_M;
-use super::{BELOW, Facts, Report, Summary, TheoryRow};
+use super::{BELOW, Facts, Loss, Report, Summary, TheoryRow};
 
 /// How closely a steady error must agree with its prediction to count as predicted.
 const PREDICTED_PART: f64 = 0.1;
@@ -16,11 +19,82 @@ pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
     }
     let is_whole = summary.complete && summary.fleet.messages.balanced;
     let coordinated = (flown > 1).then(|| of_coordination(summary));
-    let parts =
-        [coordinated, Some(of_paths(summary, facts, flown)), of_conditions(report.theory), of_rate(report.theory)];
+    let parts = [
+        of_end(report),
+        of_speeds(facts),
+        of_losses(summary),
+        of_those_that_gave_up(summary),
+        coordinated,
+        Some(of_paths(summary, facts, flown)),
+        of_conditions(report.theory),
+        of_rate(report.theory),
+    ];
     let parts = || parts.iter().flatten();
     let sentences: Vec<&str> = parts().map(|(_, sentence)| sentence.as_str()).collect();
     (is_whole && parts().all(|(good, _)| *good), sentences.join(" "))
+}
+
+/// That the flight ended before its time, and why.
+fn of_end(report: &Report<'_>) -> Option<(bool, String)> {
+    let (flown_s, planned_s) = (report.summary.duration_s, report.facts.planned_s);
+    if !is_early(flown_s, planned_s) {
+        return None;
+    }
+    let why = report.clock.notes.iter().rev().find_map(|note| note.text.strip_prefix(ENDED));
+    let why = why.map_or("Ended".to_owned(), |why| {
+        let mut letters = why.chars();
+        let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+        escape(&format!("{first}{}", letters.as_str()))
+    });
+    Some((false, format!("<strong>{why}</strong> at {} of {} s.", number(flown_s), number(planned_s))))
+}
+
+/// Formation speeds that were commanded under way: the numbers are of more than one.
+fn of_speeds(facts: &Facts) -> Option<(bool, String)> {
+    let (last_s, last) = facts.commanded.last()?;
+    let often = match facts.commanded.len() {
+        1 => String::new(),
+        times => format!(", the last of {times} times"),
+    };
+    let (last, at) = (number(*last), number(*last_s));
+    Some((true, format!("The formation speed v_L was changed under way to {last} /s at {at} s{often}.")))
+}
+
+/// Who was lost, when, and of whom the numbers are then.
+fn of_losses(summary: &Summary) -> Option<(bool, String)> {
+    let lost = &summary.fleet.lost;
+    let one = |loss: &Loss| {
+        let (id, since_s) = (escape(&loss.vehicle), loss.since_s().map(number));
+        match (since_s, loss.recorded_until_s.map(number)) {
+            (Some(at), Some(_)) => format!("<strong>{id} was lost at {at} s</strong>"),
+            (Some(at), None) => format!("<strong>{id} was lost at {at} s</strong>, and there is no log of it"),
+            (None, Some(at)) => format!("<strong>The log of {id} ends at {at} s</strong>"),
+            (None, None) => format!("<strong>There is no log of {id}</strong>"),
+        }
+    };
+    let sentences: Vec<String> = lost.iter().map(one).collect();
+    let measured = summary.vehicles.iter().filter(|vehicle| vehicle.rows > 0);
+    let others: Vec<String> = measured.map(|vehicle| escape(&vehicle.id)).collect();
+    let of_the_others = match lost.iter().any(|loss| loss.recorded_until_s.is_none()) {
+        true => format!(": the numbers are of {}", listed(&others)),
+        false => String::new(),
+    };
+    (!lost.is_empty()).then(|| (false, format!("{}{of_the_others}.", sentences.join("; "))))
+}
+
+/// Who gave up, and why.
+fn of_those_that_gave_up(summary: &Summary) -> Option<(bool, String)> {
+    let aborted: Vec<String> = summary.fleet.aborted.iter().map(|text| escape(text)).collect();
+    (!aborted.is_empty()).then(|| (false, format!("<strong>{}</strong>.", aborted.join("; "))))
+}
+
+/// a, b and c.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => "nobody".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 /// Whether the fleet came together and stayed so to the end.

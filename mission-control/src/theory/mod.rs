@@ -90,9 +90,10 @@ impl<'a> Case<'a> {
         Case { mission, network: Network::of(mission), summary, way, disturbances }
     }
 
-    /// A measured value in words, or a dash before the flight.
+    /// A measured value in words, or a dash before the flight and if nothing was recorded.
     fn measured(&self, value: impl Fn(&Summary) -> String) -> String {
-        self.summary.map_or_else(|| "–".to_string(), value)
+        let has_rows = |summary: &&Summary| summary.vehicles.iter().any(|vehicle| vehicle.rows > 0);
+        self.summary.filter(has_rows).map_or_else(|| "–".to_string(), value)
     }
 
     /// The row of a statement about how the fleet agrees.

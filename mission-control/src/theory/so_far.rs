@@ -7,10 +7,12 @@ use common::time::{Span, Time};
 use common::wire::fleet::FleetStatus;
 use common::wire::vehicle::Phase;
 use serde::Serialize;
+use vehicle_node::node::STOPPED;
 
 use super::network::Network;
 use super::premises::{looked_for, planned_exchange, tolerance};
-use super::watched::{margins, network_words};
+use super::watched::network_words;
+use crate::console::{error_in_words, short};
 
 /// Whoever was heard longer ago than this many message periods, and a second, has fallen silent.
 const SILENT_PERIODS: i64 = 5;
@@ -40,6 +42,8 @@ pub struct SoFar {
     pub initial_error: f64,
     /// See there.
     pub error: Option<f64>,
+    /// max |x_i − x_j| now, likewise.
+    pub largest: Option<f64>,
     /// What the envelope allows now.
     pub allowed: Option<f64>,
     /// All of this in words.
@@ -66,7 +70,10 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
     let planned = Seen::of(&network.planned)?;
     let missing = missing(mission, status);
     let norm = |states: Vec<f64>| disagreement::of_fleet(states.into_iter());
-    let (initial_error, error) = (norm(at_start(mission)), now(mission, status).map(norm));
+    let states = now(mission, status);
+    let largest = states.as_ref().map(|states| largest_difference(states));
+    let (initial_error, error) = (norm(at_start(mission)), states.map(norm));
+    let errors_now = error.zip(largest);
     let Some(looked) = looked_for(&flown, &network) else {
         let names = "Theorems 4.4 and 4.5 and Lemma 4.7 do not speak of this law; the report says what does";
         let verdict = missing.as_ref().map_or(names.to_string(), |premise| format!("not covered: {premise}"));
@@ -77,7 +84,7 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
             covered_by: None,
             envelope: None,
         };
-        return Some(said(&watch, flown.end, initial_error, error, None, verdict));
+        return Some(said(&watch, flown.end, initial_error, errors_now, None, verdict));
     };
     let exchange = planned_exchange(&flown, &network);
     let seen = Seen { exchange: Some(exchange), ..planned };
@@ -95,26 +102,25 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
         }
         (_, judged) => judged.to_string(),
     };
-    Some(said(&watch, flown.end, initial_error, error, allowed, verdict))
+    Some(said(&watch, flown.end, initial_error, errors_now, allowed, verdict))
 }
 
 fn said(
     watch: &monitor::Watch,
     until: Time,
     initial_error: f64,
-    error: Option<f64>,
+    errors_now: Option<(f64, f64)>,
     allowed: Option<f64>,
     verdict: String,
 ) -> SoFar {
-    let mut words = format!("network so far: {}", network_words(watch));
-    if !watch.margins.is_empty() {
-        words += &format!("\n{}", margins(watch));
+    let mut words = format!("network so far, as planned: {}", network_words(watch));
+    for margin in &watch.margins {
+        words += &format!("\n{}", margin.in_words());
     }
-    if let Some(error) = error {
-        words += &format!("\ncoordination error ‖e‖ {error:.3e}, at the start {initial_error:.3e}");
-    }
-    if let Some(allowed) = allowed {
-        words += &format!(", at most {allowed:.3e} allowed");
+    if let Some((error, largest)) = errors_now {
+        let allowed = allowed.map_or(String::new(), |allowed| format!(", at most {} allowed", short(allowed)));
+        let (now, before) = (error_in_words(error, largest), short(initial_error));
+        words += &format!("\ncoordination error now: {now}; ‖e‖ was {before} at the start{allowed}");
     }
     words += &format!("\n{verdict}");
     let Seen { alpha, t_0, dwell, mean, .. } = watch.seen;
@@ -129,7 +135,8 @@ fn said(
         covered_by: watch.covered_by,
         envelope: watch.envelope,
         initial_error,
-        error,
+        error: errors_now.map(|(error, _)| error),
+        largest: errors_now.map(|(_, largest)| largest),
         allowed,
         verdict,
         words,
@@ -147,6 +154,9 @@ fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
             let last = of.and_then(|of| of.said).map(|(made, _)| made);
             let since = last.map_or(String::new(), |made| format!(" since {:.1} s", made.secs()));
             match of {
+                Some(of) if of.phase == Phase::Aborted && of.reason == STOPPED => {
+                    Some(format!("{} was stopped", plan.id))
+                }
                 Some(of) if of.phase == Phase::Aborted => Some(format!("{} gave up{}", plan.id, because(&of.reason))),
                 Some(of) if !of.connected => Some(format!("{} is not connected, silent{since}", plan.id)),
                 None => Some(format!("{} is not connected", plan.id)),
@@ -158,6 +168,11 @@ fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
         })
         .collect();
     (!found.is_empty()).then(|| Premise { asks: "every vehicle all the time", found: found.join(", ") })
+}
+
+fn largest_difference(states: &[f64]) -> f64 {
+    let (least, most) = states.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    most - least
 }
 
 fn because(reason: &str) -> String {
@@ -205,6 +220,7 @@ mod tests {
             vehicles: vehicles.collect(),
             collected: false,
             messages: [0; 4],
+            counted_from: Time::ZERO,
             pace: None,
         };
         (mission, status)
@@ -216,6 +232,14 @@ mod tests {
         let so_far = so_far(&mission, &near).expect("time has passed");
         assert!(so_far.verdict.starts_with("covered by Theorem 4.4"), "{}", so_far.verdict);
         assert!((so_far.error.expect("all spoke") - 0.02f64.sqrt()).abs() < 1e-9);
+        assert!(
+            so_far.to_string().contains("coordination error now: ‖e‖ = 0.1414, max |x_i − x_j| = 0.2;"),
+            "{so_far}"
+        );
+        assert!(
+            so_far.to_string().contains("network so far, as planned: α = ")
+                && so_far.to_string().contains("less than 0.625 s will do")
+        );
         assert!(so_far.to_string().contains("dwell time 2.500 s") && so_far.margins.len() >= 5, "{so_far}");
         let (mission, far) = at(60.0, [10.0, 30.0, 90.0], [true; 3]);
         let so_far = super::so_far(&mission, &far).expect("time has passed");
@@ -232,6 +256,9 @@ mod tests {
         status.vehicles[0].reason = "it has diverged".into();
         let gave_up = so_far(&mission, &status).expect("time has passed");
         assert!(gave_up.covered_by.is_none() && gave_up.verdict.contains("auv1 gave up: it has diverged"), "{gave_up}");
+        status.vehicles[0].reason = STOPPED.into();
+        let stopped = so_far(&mission, &status).expect("time has passed").verdict;
+        assert!(stopped.contains("auv1 was stopped") && !stopped.contains("gave up"), "{stopped}");
         status.vehicles[0].phase = Phase::Running;
         status.vehicles[1].said = Some((Time::from_secs(50.0), 25.0));
         let silent = so_far(&mission, &status).expect("time has passed");

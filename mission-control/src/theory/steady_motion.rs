@@ -11,7 +11,7 @@ use super::Case;
 use super::fleet::{rate_in_the_end, v_l_at_the_end};
 use super::late_news::as_the_law_takes_them;
 use super::talk::common_delay;
-use crate::results::TheoryRow;
+use crate::results::{TheoryRow, VehicleSummary};
 
 /// Biases that differ by less are shown as one \[m\].
 const SAME_BIAS: f64 = 5e-4;
@@ -144,7 +144,9 @@ pub(super) fn bias(case: &Case<'_>) -> Option<TheoryRow> {
     let ids = || mission.vehicles.iter().map(|plan| plan.id.as_str());
     let predicted: Vec<Option<f64>> = known.unwrap_or_default();
     let measured = |s: &crate::results::Summary| {
-        let of = |id: &str| s.vehicles.iter().find(|vehicle| vehicle.id == id).map(|vehicle| vehicle.along_mean_m);
+        let is_measured = |vehicle: &&VehicleSummary| vehicle.rows > 0;
+        let of = |id: &str| s.vehicles.iter().filter(is_measured).find(|vehicle| vehicle.id == id);
+        let of = |id: &str| of(id).map(|vehicle| vehicle.along_mean_m);
         let with_delta = |i: usize, id| mission.rank_margin(i).and_then(|_| of(id));
         words(ids().enumerate().map(|(i, id)| (id, with_delta(i, id))))
     };

@@ -6,7 +6,7 @@
 use common::graph::Graph;
 use common::mission::Mission;
 use common::mission::file::LawChoice;
-use common::theory::monitor::{self, Envelope, Exchange, Judgement, Premise, Seen, Tolerance, Watch, Watched};
+use common::theory::monitor::{self, Envelope, Exchange, Judgement, Margin, Premise, Seen, Tolerance, Watch, Watched};
 use common::time::Span;
 
 use super::network::Network;
@@ -50,7 +50,7 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
 pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guarantee> {
     let case = Case::new(mission, Some(summary));
     let Some(looked) = looked_for(mission, &case.network) else {
-        return guarantee_of(&case).filter(|_| summary.fleet.aborted.is_empty());
+        return guarantee_of(&case).filter(|_| not_there(&summary.fleet).is_empty());
     };
     let seen = seen(mission, summary.fleet.connectivity.as_ref()?, &looked)?;
     let broken = looked.broken.iter().cloned().chain(not_there(&summary.fleet)).collect();
@@ -135,7 +135,16 @@ fn absent(absences: &[Absence]) -> Option<Premise> {
 fn not_there(fleet: &FleetSummary) -> Vec<Premise> {
     let gone = fleet.aborted.join(", ");
     let gave_up = (!gone.is_empty()).then_some(Premise { asks: PRESENT, found: gone });
-    absent(&fleet.absences).into_iter().chain(gave_up).collect()
+    let without = unrecorded(fleet).join(", ");
+    let found = format!("there is no log of {without}");
+    let unrecorded = (!without.is_empty()).then_some(Premise { asks: PRESENT, found });
+    absent(&fleet.absences).into_iter().chain(unrecorded).chain(gave_up).collect()
+}
+
+/// Vehicles without a log: what is measured of the fleet's error is that of the others.
+fn unrecorded(fleet: &FleetSummary) -> Vec<&str> {
+    let without = fleet.lost.iter().filter(|loss| loss.recorded_until_s.is_none());
+    without.map(|loss| loss.vehicle.as_str()).collect()
 }
 
 /// Agreement is promised without an envelope, and yet the fleet ended far beyond where it began: further apart than ten times the start
@@ -155,7 +164,7 @@ const FAR: f64 = 10.0;
 /// What can be said of the flight before the first vehicle fell silent.
 fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
     let summary = case.summary?;
-    let first = summary.fleet.absences.first()?;
+    let first = summary.fleet.absences.first().filter(|_| unrecorded(&summary.fleet).is_empty())?;
     let seen = seen(case.mission, summary.fleet.connectivity_before.as_ref()?, looked)?;
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, looked.broken.clone());
     let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
@@ -247,11 +256,8 @@ pub(super) fn network_words(watch: &Watch) -> String {
 }
 
 /// Every condition with its value and its limit.
-pub(super) fn margins(watch: &Watch) -> String {
-    let words = watch.margins.iter().map(|margin| {
-        format!("{}: {} = {:.4}, limit {:.4}", margin.statement, margin.quantity, margin.value, margin.limit)
-    });
-    words.collect::<Vec<_>>().join("; ")
+fn margins(watch: &Watch) -> String {
+    watch.margins.iter().map(Margin::in_words).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]
@@ -363,6 +369,33 @@ mod tests {
         assert!(row.measured.contains("auv3 is silent from 57.0 s to 120.0 s"), "{}", row.measured);
         assert!(row.measured.contains("judged until 57.0 s alone: covered by Theorem 4.4"), "{}", row.measured);
         assert_eq!((row.holds, guarantee), (Some(false), None));
+    }
+
+    #[test]
+    fn nothing_is_measured_of_a_vehicle_without_a_log() {
+        let mission = changed(BRIEF_LOSSES, &[]);
+        let mut recording = flown(&mission);
+        let gone = |record: &Record| match record {
+            Record::State(row) => &*row.vehicle == "auv3",
+            Record::Message(row) => &*row.from == "auv3" && row.sent_ns > 57_000_000_000,
+            _ => false,
+        };
+        recording.exact.retain(|record| !gone(record));
+        let (row, guarantee) = judged(&mission, &recording);
+        assert!(row.measured.contains("auv3 is silent from 57.0 s to 120.0 s"), "{}", row.measured);
+        assert!(row.measured.contains("there is no log of auv3"), "{}", row.measured);
+        // What is known of the error until then is that of the two others.
+        assert!(!row.measured.contains("judged until"), "{}", row.measured);
+        assert_eq!((row.holds, guarantee), (Some(false), None));
+        let summary = summarise(&recording, &facts(&mission));
+        let rows = super::super::rows(&mission, Some(&summary));
+        let bias = rows.iter().find(|row| row.name.starts_with("Along-path bias")).expect("it has δ");
+        assert!(!bias.measured.contains("auv3") && !bias.measured.contains("0.000"), "{}", bias.measured);
+        // Of nothing at all, nothing is measured.
+        let summary = summarise(&Recording::default(), &facts(&mission));
+        for row in super::super::rows(&mission, Some(&summary)) {
+            assert!(!row.measured.contains("0.000") && !row.measured.contains("NaN"), "{row:?}");
+        }
     }
 
     #[test]

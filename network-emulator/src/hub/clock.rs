@@ -35,6 +35,7 @@ impl Hub {
         let (mission, fresh) = (SharedMission(load.mission.clone()), !load.adopted);
         self.outputs.push_back(HubOutput::OpenLog { mission, fresh });
         if load.adopted {
+            load.counted_from = now.min(load.mission.end);
             load.emulator.skip_to(now);
             absent.into_iter().for_each(|vehicle| load.emulator.presence(now, vehicle, false));
             while load.emulator.poll_output().is_some() {}

@@ -8,7 +8,7 @@ use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
 
-use super::{COLLECTOR, FASTEST, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
+use super::{COLLECTOR, ENDED, FASTEST, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
 use crate::emulator::Emulator;
 
 impl Hub {
@@ -88,6 +88,7 @@ impl Hub {
                 ClockPlan::Stepped => Pace::Stepped,
             }),
             messages: self.totals(),
+            counted_from: load.map_or(Time::ZERO, |load| load.counted_from),
         };
         self.answer(FromFleet::Status(status));
     }
@@ -132,6 +133,7 @@ impl Hub {
             speeds: Vec::new(),
             adopted,
             collected: false,
+            counted_from: Time::ZERO,
             now: Time::ZERO,
         });
         self.take_seats();
@@ -213,11 +215,11 @@ impl Hub {
         if was_running {
             load.emulator.finish(now);
             self.drain_emulator();
-            self.note(now, why);
+            self.note(now, &format!("{ENDED}{why}"));
             self.outputs.push_back(HubOutput::CloseLog);
         }
         self.tell_fleet(&ToVehicle::Stop);
-        self.say(format!("flight ended: {why}"));
+        self.say(format!("{ENDED}{why}"));
         self.status(now);
     }
 

@@ -28,6 +28,9 @@ pub const OPERATOR: &str = "operator";
 /// Name of the hub as a source of logs and notes.
 pub const HUB: &str = "network-emulator";
 
+/// The note with which a flight ends before its time begins with this; what follows is why.
+pub const ENDED: &str = "flight ended: ";
+
 /// A speed commanded now holds from this much later, so that every vehicle has it in time \[s of wall clock\].
 const SPEED_LEAD_S: f64 = 0.25;
 
@@ -167,6 +170,8 @@ struct Load {
     adopted: bool,
     /// Its logs are where they belong.
     collected: bool,
+    /// From when on messages are counted.
+    counted_from: Time,
     now: Time,
 }
 

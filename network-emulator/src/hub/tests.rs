@@ -196,7 +196,10 @@ fn a_real_flight_ends_when_no_vehicle_flies_any_more() {
     assert_eq!(hub.phase(), Phase::Running, "auv3 flies on");
     let said = ended(&mut hub, 1.2, "auv3", "it has diverged");
     assert_eq!(hub.phase(), Phase::Aborted);
-    assert!(said.contains(&HubOutput::CloseLog) && notes(&said).contains(&"no vehicle flies any more"), "{said:?}");
+    assert!(
+        said.contains(&HubOutput::CloseLog) && notes(&said).contains(&"flight ended: no vehicle flies any more"),
+        "{said:?}"
+    );
 }
 
 #[test]
@@ -249,6 +252,24 @@ fn a_hub_without_memory_that_was_given_the_mission_again_takes_up_the_flight() {
     hub.handle(Time::ZERO, Some(joined("auv3")));
     let said = hello(&mut hub, "auv3", running(vec![], 0));
     assert!(said.contains(&HubOutput::FollowClock(epoch())), "{said:?}");
+}
+
+#[test]
+fn a_hub_that_takes_up_a_flight_says_since_when_it_counts() {
+    let counted = |hub: &mut Hub, at_s: f64| {
+        let said = ask(hub, Time::from_secs(at_s), ToFleet::Status);
+        said.into_iter().find_map(|output| match output {
+            HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some(status.counted_from),
+            _ => None,
+        })
+    };
+    let mut first = flying(Pace::Real { speed_up: 1.0 }, epoch());
+    assert_eq!(counted(&mut first, 60.0), Some(Time::ZERO));
+    let mut back = Hub::new();
+    back.handle(Time::ZERO, Some(joined("auv3")));
+    hello(&mut back, "auv3", running(vec![], 0));
+    back.handle(Time::from_secs(50.0), Some(HubInput::ClockStarted(epoch())));
+    assert_eq!(counted(&mut back, 60.0), Some(Time::from_secs(50.0)));
 }
 
 fn recorded(outputs: &[HubOutput]) -> Vec<&common::record::Record> {

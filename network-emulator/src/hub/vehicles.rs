@@ -212,6 +212,7 @@ impl Hub {
                 // A stepped run does not outlive its hub.
                 load.phase = if phase == Phase::Running { Phase::Aborted } else { phase };
                 load.now = load.mission.end;
+                load.counted_from = load.mission.end;
             }
         }
         let others: Vec<String> = self.connected().into_iter().filter(|other| other != id).collect();

@@ -41,6 +41,9 @@ use crate::time::Span;
 
 /// What conditions on messages in periods are filed under.
 const IN_PERIODS: &str = "messages in periods";
+const AGE: &str = "age of news [s]";
+const AGE_BY_RATE: &str = "age of news × largest eigenvalue of KL";
+const UNHEARD: &str = "unheard part of a link's up time";
 
 /// The most that age over shortest up time, and the unheard part, may be.
 const SMALL: f64 = 0.25;
@@ -213,10 +216,9 @@ impl Watch {
     /// Whether messages in periods are close enough to hearing one another all the time.
     fn exchange(&mut self, speed: f64) -> bool {
         let Some(Exchange { age, shortest_up, unheard }) = self.seen.exchange else { return true };
-        let fresh = self.asks(IN_PERIODS, "age of news [s]", age.secs(), SMALL * shortest_up.secs());
-        let calm =
-            speed == 0.0 || self.asks(IN_PERIODS, "age of news × largest eigenvalue of KL", age.secs() * speed, 1.0);
-        let heard = self.asks(IN_PERIODS, "unheard part of a link's up time", unheard, SMALL);
+        let fresh = self.asks(IN_PERIODS, AGE, age.secs(), SMALL * shortest_up.secs());
+        let calm = speed == 0.0 || self.asks(IN_PERIODS, AGE_BY_RATE, age.secs() * speed, 1.0);
+        let heard = self.asks(IN_PERIODS, UNHEARD, unheard, SMALL);
         fresh && calm && heard
     }
 
