@@ -250,13 +250,54 @@ fn in_order_no_message_overtakes_an_earlier_one() {
         let words: Vec<(f64, u16, u32)> = (0..200).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
         let (_, outputs) = run(&mission, &words, 60.0);
         let arrived = |output: &Channel| match output {
-            Channel::Settled(settled) => Some((settled.due_ns, settled.seq)),
+            Channel::Settled(settled) if !settled.fate.is_of_copy() => Some((settled.due_ns, settled.seq)),
             _ => None,
         };
         let arrived: Vec<(i64, u64)> = outputs.iter().filter_map(arrived).collect();
         assert_eq!(arrived.iter().map(|(_, seq)| seq).is_sorted(), sorted, "{order}");
         assert!(arrived.iter().map(|(due, _)| due).is_sorted());
     }
+}
+
+#[test]
+fn copies_hold_no_original_back_nor_take_its_place() {
+    for more in ["order = \"in_order\"", "queue = 5", "order = \"in_order\"\nqueue = 7", "order = \"free\""] {
+        let with_copies = |probability: f64| {
+            let mission = mission(&format!(
+                "delay = {{ jittered = {{ min_s = 0.1, max_s = 2.0 }} }}\n{more}\nduplicate_probability = {probability:?}"
+            ));
+            let words: Vec<(f64, u16, u32)> = (0..400).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
+            let (emulator, outputs) = run(&mission, &words, 60.0);
+            let row = |output: &Channel| match output {
+                Channel::Settled(settled) => Some((settled.seq, settled.due_ns, settled.fate)),
+                _ => None,
+            };
+            let (copies, originals): (Vec<_>, Vec<_>) =
+                outputs.iter().filter_map(row).partition(|(_, _, fate)| fate.is_of_copy());
+            (emulator.ledgers().next().map_or(0, |ledger| ledger.copies), copies, originals)
+        };
+        let ((none, ..), (made, copies, originals)) = (with_copies(0.0), with_copies(0.9));
+        assert!(none == 0 && made > 100, "{made}");
+        assert!(with_copies(0.0).2 == originals, "the originals fare as without copies, {more}");
+        let overtaken = |copy: &(u64, i64, Fate)| originals.iter().any(|other| other.0 > copy.0 && other.1 < copy.1);
+        assert!(copies.iter().any(overtaken), "a copy that is late lets others pass");
+        let first = |copy: &(u64, i64, Fate)| originals.iter().any(|own| own.0 == copy.0 && own.1 <= copy.1);
+        assert!(copies.iter().all(first), "and none comes before its original");
+    }
+}
+
+#[test]
+fn there_are_no_more_copies_under_way_than_places_in_the_queue() {
+    let mission =
+        mission("delay = { jittered = { min_s = 1.0, max_s = 60.0 } }\nqueue = 3\nduplicate_probability = 1.0");
+    let words: Vec<(f64, u16, u32)> = (0..900).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for (at, _, seq) in words {
+        emulator.handle(seconds(at), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+        emulator.handle(seconds(at), None);
+        assert!(emulator.ledgers().all(|ledger| ledger.in_flight <= 3 && ledger.copies_in_flight <= 3));
+    }
+    assert!(emulator.ledgers().next().is_some_and(|ledger| ledger.copies > 3));
 }
 
 #[test]
@@ -340,7 +381,11 @@ fn what_is_spoilt_on_the_air_has_no_copy_that_is_heard() {
         for (ledger, spoilt) in emulator.ledgers().zip(spoilt) {
             assert!(ledger.copies > 30, "{ledger:?}");
             let fate = if spoilt { Fate::CopyDropped } else { Fate::Copied };
-            assert_eq!((ledger.of(cause), ledger.of(fate)), (if spoilt { 150 } else { 0 }, ledger.copies), "{ledger:?}");
+            assert_eq!(
+                (ledger.of(cause), ledger.of(fate)),
+                (if spoilt { 150 } else { 0 }, ledger.copies),
+                "{ledger:?}"
+            );
         }
         let [copies, originals] = heard(&outputs);
         assert!(copies.is_subset(&originals));
