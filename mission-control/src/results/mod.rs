@@ -12,6 +12,7 @@
 
 mod chart;
 mod decay;
+mod deliveries;
 mod diff;
 pub(crate) mod drawing;
 mod export;
@@ -31,6 +32,7 @@ pub(crate) mod testing;
 mod trace;
 
 pub use chart::{Chart, Curve};
+pub use deliveries::{DeliverySummary, LinkDeliveries};
 pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts, Way};
@@ -43,7 +45,7 @@ pub use report::{BELOW, Report, TheoryRow, report};
 pub use series::{Coordination, Track, tracks};
 pub use statistics::{ExponentialFit, FIT_PART, fit_coordination, fit_exponential, settling_time};
 pub use summary::{
-    Absence, ClockSummary, CoordinationSummary, DeadlineSummary, DeliverySummary, FleetSummary, MessageTotals,
-    NoteSummary, OverrunSummary, Summary, VehicleSummary, summarise, summarise_clock,
+    Absence, ClockSummary, CoordinationSummary, DeadlineSummary, FleetSummary, MessageTotals, NoteSummary,
+    OverrunSummary, Summary, VehicleSummary, summarise, summarise_clock,
 };
 pub use trace::network_section;
