@@ -1,8 +1,8 @@
-//! How late deliveries on a real clock were, over all and by link.
+//! How late deliveries on a real clock were: over all, by link, and each by itself.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
-use common::record::{AchievedRow, ClockRecord};
+use common::record::{AchievedRow, ClockRecord, Fate, MessageRow};
 use serde::Serialize;
 
 use super::network::Spread;
@@ -71,6 +71,23 @@ fn achieved(clock: &[ClockRecord]) -> impl Iterator<Item = &AchievedRow> {
     })
 }
 
+/// The lateness of each delivery, found by its message.
+pub(super) struct Lateness<'a>(HashMap<(&'a str, &'a str, u64, i64), i64>);
+
+impl<'a> Lateness<'a> {
+    pub(super) fn of(clock: &'a [ClockRecord]) -> Lateness<'a> {
+        // The number alone begins anew with an emulator that takes up a flight; the instant tells its lives apart.
+        Lateness(achieved(clock).map(|row| ((&*row.from, &*row.to, row.seq, row.t_ns), row.late_ns)).collect())
+    }
+
+    /// How much later than due it was handed over \[ns of wall clock\], if it was delivered on a real clock.
+    pub(super) fn late_ns(&self, message: &MessageRow) -> Option<i64> {
+        // A copy has the number of its original, and may be due with it.
+        let delivered = (message.fate == Fate::Delivered).then_some(message)?;
+        self.0.get(&(&*delivered.from, &*delivered.to, delivered.seq, delivered.t_ns)).copied()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,5 +109,19 @@ mod tests {
         let json = serde_json::to_value(&links[0]).expect("JSON");
         assert_eq!((&json["from"], &json["least_late_s"]), (&"a".into(), &(-2e-6).into()));
         assert_eq!(deliveries(&[]), (None, Vec::new()));
+    }
+
+    #[test]
+    fn a_message_finds_its_own_lateness_and_its_copy_none() {
+        let clock = [row("b", 3, -5)];
+        let late = Lateness::of(&clock);
+        let message = |seq, t_ns, fate| {
+            let (from, to) = ("a".into(), "b".into());
+            MessageRow { t_ns, from, to, seq, sent_ns: 0, due_ns: t_ns, fate }
+        };
+        assert_eq!(late.late_ns(&message(3, 7, Fate::Delivered)), Some(-5));
+        for other in [(3, 7, Fate::Copied), (2, 7, Fate::Delivered), (3, 8, Fate::Delivered)] {
+            assert_eq!(late.late_ns(&message(other.0, other.1, other.2)), None);
+        }
     }
 }
