@@ -68,10 +68,14 @@ impl RealClock {
         }
         Some(instant)
     }
+}
 
-    /// How long ago `time` was, on the wall; zero if it is still to come.
-    pub fn lateness(&self, time: Time) -> Duration {
-        self.instant_of(time).map_or(Duration::ZERO, |due| Instant::now().saturating_duration_since(due))
+/// How much later than `due` this moment is \[ns\]; negative if it is earlier.
+pub fn late_ns(at: Instant, due: Instant) -> i64 {
+    let nanos = |length: Duration| i64::try_from(length.as_nanos()).unwrap_or(i64::MAX);
+    match at.checked_duration_since(due) {
+        Some(late) => nanos(late),
+        None => -nanos(due.saturating_duration_since(at)),
     }
 }
 
@@ -164,11 +168,9 @@ mod tests {
     }
 
     #[test]
-    fn lateness_is_zero_before_and_positive_after() {
-        let clock = RealClock::new(SystemTime::now() - Duration::from_secs(10), 2.0);
-        assert_eq!(clock.lateness(Time::from_secs(1e6)), Duration::ZERO);
-        let late = clock.lateness(Time::from_secs(10.0)).as_secs_f64();
-        assert!((5.0..60.0).contains(&late), "{late}");
+    fn lateness_is_negative_before_and_positive_after() {
+        let (due, a_little) = (Instant::now(), Duration::from_nanos(7));
+        assert_eq!([due + a_little, due, due - a_little].map(|at| late_ns(at, due)), [7, 0, -7]);
     }
 
     proptest! {

@@ -177,7 +177,7 @@ pub struct Settled {
     /// Its fate.
     pub fate: Fate,
     /// In real time, for a message that was delivered: how much later than due it was handed to the receiver's session
-    /// \[ns of wall clock\].
+    /// \[ns of wall clock\]; negative if early.
     pub late_ns: Option<i64>,
 }
 
@@ -249,7 +249,7 @@ pub struct AchievedRow {
     pub seq: u64,
     /// Commanded delay \[ns of mission time\].
     pub commanded_ns: i64,
-    /// Achieved minus commanded \[ns of wall clock\]; never negative.
+    /// Achieved minus commanded \[ns of wall clock\]; negative if it was handed over early.
     pub late_ns: i64,
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use bus::Plane;
-use bus::clock::AtMostEvery;
+use bus::clock::{AtMostEvery, late_ns};
 use bus::console::{Parent, StopFlag};
 use bus::drive::{Clock, Next, Port, Program, Rest, Shared, drive};
 use bus::logs::Logs;
@@ -187,12 +187,14 @@ struct HubPort {
     recording_failed: Option<String>,
 }
 
-/// The messages of a line were handed to its session: records them, with how late that was.
-fn settle(posted: &mut [Vec<Posted>], logs: &mut Logs, line: LineId, at: Instant) {
-    for (mut settled, due) in posted.get_mut(line.index()).into_iter().flat_map(|posted| posted.drain(..)) {
-        let late = due.map_or(Duration::ZERO, |due| at.saturating_duration_since(due));
-        settled.late_ns = Some(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX));
-        logs.settled(&settled);
+/// The messages of a line were handed to its session: records them, with how late that was. Had one been early, its record
+/// would say so.
+fn settle(posted: &mut [Vec<Posted>], line: usize, at: Instant, mut record: impl FnMut(&Settled)) {
+    for (mut settled, due) in posted.get_mut(line).into_iter().flat_map(|posted| posted.drain(..)) {
+        if let Some(due) = due {
+            settled.late_ns = Some(late_ns(at, due));
+        }
+        record(&settled);
     }
 }
 
@@ -233,7 +235,7 @@ impl HubPort {
     /// Sends what was posted, and records how late it was at that moment; how many messages.
     fn hand_over(&mut self) -> usize {
         let (posted, logs) = (&mut self.posted, &mut self.logs);
-        self.switchboard.flush(|line, at| settle(posted, logs, line, at))
+        self.switchboard.flush(|line, at| settle(posted, line.index(), at, |settled| logs.settled(settled)))
     }
 
     /// Records how many states were dropped for want of time or room since it was last done, by line and place.
@@ -328,7 +330,7 @@ impl Port for HubPort {
                         self.posted[line.index()].push((settled, due));
                     }
                     if let Some(at) = self.switchboard.post(*line, &bytes) {
-                        settle(&mut self.posted, &mut self.logs, *line, at);
+                        settle(&mut self.posted, line.index(), at, |settled| self.logs.settled(settled));
                     }
                 }
                 _ => settled.iter().for_each(|settled| self.logs.settled(settled)),
@@ -420,5 +422,28 @@ impl Port for HubPort {
     fn closed(&mut self) -> ExitCode {
         tracing::error!("the switchboard is closed");
         ExitCode::from(3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use common::record::Fate;
+
+    use super::*;
+
+    #[test]
+    #[allow(clippy::disallowed_methods, reason = "lateness is a difference of moments")]
+    fn a_hand_over_before_its_time_is_recorded_as_early() {
+        let (at, a_little) = (Instant::now(), Duration::from_micros(3));
+        let settled = |seq| {
+            let (fate, late_ns) = (Fate::Delivered, Some(0));
+            Settled { t_ns: 5, link: 0, seq, sent_ns: 0, due_ns: 5, fate, late_ns }
+        };
+        let due = [at + a_little, at, at - a_little].map(Some);
+        let mut posted = vec![Vec::new(), (0..).map(settled).zip(due).collect()];
+        let mut late = Vec::new();
+        settle(&mut posted, 1, at, |settled| late.push((settled.seq, settled.late_ns)));
+        assert_eq!(late, [(0, Some(-3000)), (1, Some(0)), (2, Some(3000))]);
+        assert_eq!(posted[1], []);
     }
 }

@@ -25,7 +25,7 @@ use common::time::{Span, Time};
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::state::CoordinationState;
 use common::wire::vehicle::{FromVehicle, Phase, ToVehicle};
-use cpf_tests::{Ground, mission, mission_text, program};
+use cpf_tests::{Ground, mission, mission_text, program, with};
 use mission_control::sweep::plan::Plan as SweepPlan;
 use mission_control::sweep::setting::Setting;
 use network_emulator::emulator::{Channel, Emulator, Sent};
@@ -457,44 +457,76 @@ fn throughput() {
 
 /// Achieved minus commanded delay, as the emulator records it for every message.
 fn delay() {
-    let constant = |name: &str, seconds: f64| {
-        (name.to_string(), seconds, format!("delay = {{ constant = {{ delay_s = {seconds:?} }} }}"))
-    };
-    let everything = "delay = { jittered = { min_s = 0.005, max_s = 0.02 } }\n\
-        loss = { gilbert_elliott = { mean_burst = 3.0, mean_gap = 57.0 } }\n\
-        range = { curve = { points = [[0.0, 1.0], [100.0, 0.5]] } }\n\
-        duplicate_probability = 0.02\ncorrupt_probability = 0.02\norder = \"in_order\"\n\
-        medium = { rate_bps = 1e8, packet_bytes = 64, queue = 100, backoff_s = 0.0001, half_duplex = true, collisions = true }\n\
-        switching = { markov = { mean_up_s = 2.0, mean_down_s = 0.5 } }";
-    let every_model = ("5 to 20 ms, every model switched on".to_string(), 0.02, everything.to_string());
-    for (name, seconds, network) in
-        [constant("5 ms", 0.005), constant("100 ms", 0.1), constant("1 s", 1.0), every_model]
-    {
-        let emulated = Emulated::new(&network, |_, _| {});
-        let begun = Instant::now();
-        for i in 0..3000u32 {
-            let due = begun + Duration::from_micros(1000) * i;
-            std::thread::sleep(due.saturating_duration_since(Instant::now()));
-            emulated.send();
-        }
+    for (name, seconds) in [("5 ms", 0.005), ("100 ms", 0.1), ("1 s", 1.0)] {
+        let emulated = Emulated::new(&format!("delay = {{ constant = {{ delay_s = {seconds:?} }} }}"), |_, _| {});
+        paced(3000).for_each(|_| _ = emulated.send());
         std::thread::sleep(Duration::from_secs_f64(seconds + 1.5));
-        let folder = emulated.folder.join(format!("{:016x}", emulated.mission.digest));
-        let recording = bus::recording::read(folder.join("network-emulator.mcap")).expect("readable while written");
-        let late: Vec<f64> = recording
-            .clock
-            .iter()
-            .filter_map(|row| match row {
-                ClockRecord::Achieved(row) => Some(row.late_ns as f64 / 1e3),
-                _ => None,
-            })
-            .collect();
-        let n = late.len();
-        let late = sorted(late);
-        row(
-            &format!("achieved minus commanded, {name}, 1000/s ({n} messages): least / p50 / p99"),
-            &format!("{:.0} / {:.0} / {:.0} µs", late[0], percentile(&late, 0.5), percentile(&late, 0.99)),
-        );
+        punctuality(name, &emulated.mission, &emulated.folder);
     }
+    delay_with_everything();
+}
+
+/// The same with every model on that can be on together: four vehicles speak 250 times a second each.
+fn delay_with_everything() {
+    let text = with(&mission_text("tests/missions/everything-fast.toml"), "duration_s = 6.0", "duration_s = 600.0");
+    let (ground, mission) = (Ground::new(), mission(&text));
+    let folder = ground.path("logs");
+    let (mut emulator, endpoint) = emulator(&folder);
+    let (lines, _control) = under_way(&text, &mission, &endpoint);
+    let mut vehicles = Vec::new();
+    for (line, events) in lines {
+        std::thread::spawn(move || events.for_each(drop));
+        vehicles.push(line);
+    }
+    let speakers = vehicles.len() as u32;
+    for i in paced(4000) {
+        let sender = i % speakers;
+        let bytes = word(&mission, sender as u16, i / speakers);
+        let _ = vehicles[sender as usize].send(Plane::State, &bytes);
+    }
+    std::thread::sleep(Duration::from_secs(2));
+    punctuality(EVERYTHING_ON, &mission, &folder);
+    let _ = emulator.kill();
+    let _ = emulator.wait();
+}
+
+/// What tests/missions/everything-fast.toml has on.
+const EVERYTHING_ON: &str = "10 to 30 ms with four speakers and all of this on: slots with guard time, preamble, backoff, duty cycle, \
+    half duplex, collisions, queues; range curve and disc; Markov and random switching; bursts, shared fades, a trace and single losses; \
+    distance, jitter, gamma and normal delays in order; copies; flipped bits";
+
+/// So many turns, a thousand a second.
+fn paced(turns: u32) -> impl Iterator<Item = u32> {
+    let begun = Instant::now();
+    (0..turns).inspect(move |turn| {
+        let due = begun + Duration::from_micros(1000) * *turn;
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+    })
+}
+
+/// How late the deliveries of this flight were, as its emulator recorded it, and how many of the messages were delivered.
+fn punctuality(name: &str, mission: &Mission, folder: &Path) {
+    let log = folder.join(format!("{:016x}", mission.digest)).join("network-emulator.mcap");
+    let recording = bus::recording::read(log).expect("readable while written");
+    let late = |row: &ClockRecord| match row {
+        ClockRecord::Achieved(row) => Some(row.late_ns as f64 / 1e3),
+        _ => None,
+    };
+    let late = sorted(recording.clock.iter().filter_map(late).collect());
+    let sent =
+        recording.exact.iter().filter(|row| matches!(row, Record::Message(row) if !row.fate.is_of_copy())).count();
+    let early = if late[0] < 0.0 { "EARLY" } else { "never early" };
+    row(
+        &format!("achieved minus commanded, {name}, 1000/s: least / p50 / p99; share delivered"),
+        &format!(
+            "{:.0} / {:.0} / {:.0} µs, {early}; {} of {sent}, {:.0} %",
+            late[0],
+            percentile(&late, 0.5),
+            percentile(&late, 0.99),
+            late.len(),
+            100.0 * late.len() as f64 / sent as f64
+        ),
+    );
 }
 
 /// Fifty vehicle processes in real time for a minute.

@@ -41,7 +41,7 @@ pub(super) fn export(run: &Path, format: Format, out: Option<PathBuf>) -> Ended 
     std::fs::create_dir_all(&out).map_err(failed)?;
     match format {
         Format::Csv => {
-            export_csv(&recording.exact, &out).map_err(failed)?;
+            export_csv(&recording, &out).map_err(failed)?;
             bus::tell!("{} rows to {}/{{vehicles,links,topology}}.csv", recording.exact.len(), out.display());
         }
         Format::Network => {

@@ -6,7 +6,7 @@ use bus::recording::Recording;
 use common::record::{ClockRecord, Overrun};
 use serde::Serialize;
 
-use super::links::Spread;
+use super::deliveries::{DeliverySummary, LinkDeliveries, deliveries};
 use super::punctuality::{ClockVerdict, verdict};
 
 /// Everything that depends on the wall clock and the machine.
@@ -16,6 +16,8 @@ pub struct ClockSummary {
     pub format: u32,
     /// Lateness of the deliveries: achieved minus commanded delay.
     pub deliveries: Option<DeliverySummary>,
+    /// The same by directed link, for those that delivered something.
+    pub links: Vec<LinkDeliveries>,
     /// Deadlines of the control loops.
     pub deadlines: Vec<DeadlineSummary>,
     /// Messages that no model of the network dropped, but a program or session that did not keep up.
@@ -35,17 +37,6 @@ pub struct OverrunSummary {
     pub place: Overrun,
     /// How many; the oldest.
     pub count: u64,
-}
-
-/// Lateness of deliveries.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DeliverySummary {
-    /// Number of deliveries.
-    pub count: u64,
-    /// Commanded delay \[s\].
-    pub commanded_s: Spread,
-    /// Achieved minus commanded \[s\].
-    pub late_s: Spread,
 }
 
 /// Deadlines of one vehicle's control loop.
@@ -76,15 +67,12 @@ pub struct NoteSummary {
 
 /// The numbers of a run that depend on the wall clock.
 pub fn summarise_clock(recording: &Recording) -> ClockSummary {
-    let (mut commanded, mut late) = (Vec::new(), Vec::new());
     let mut overruns: BTreeMap<(&str, Overrun), u64> = BTreeMap::new();
-    let mut summary = ClockSummary { format: 1, ..ClockSummary::default() };
+    let (deliveries, links) = deliveries(&recording.clock);
+    let mut summary = ClockSummary { format: 1, deliveries, links, ..ClockSummary::default() };
     for record in &recording.clock {
         match record {
-            ClockRecord::Achieved(row) => {
-                commanded.push(row.commanded_ns as f64 / 1e9);
-                late.push(row.late_ns as f64 / 1e9);
-            }
+            ClockRecord::Achieved(_) => {}
             ClockRecord::Ticks(row) => {
                 let worst_late_s = row.worst_late_ns as f64 / 1e9;
                 match summary.deadlines.iter_mut().find(|deadlines| *deadlines.vehicle == *row.vehicle) {
@@ -111,11 +99,6 @@ pub fn summarise_clock(recording: &Recording) -> ClockSummary {
         }
     }
     summary.deadlines.sort_by(|a, b| a.vehicle.cmp(&b.vehicle));
-    summary.deliveries = Spread::of(&commanded).zip(Spread::of(&late)).map(|(commanded_s, late_s)| DeliverySummary {
-        count: late.len() as u64,
-        commanded_s,
-        late_s,
-    });
     let overrun = |((vehicle, place), count): ((&str, Overrun), u64)| {
         let vehicle = vehicle.to_owned();
         OverrunSummary { vehicle, place, count }

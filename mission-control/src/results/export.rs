@@ -1,12 +1,16 @@
 //! A recording as tables: `vehicles.csv`, `links.csv`, `topology.csv`.
 //!
-//! Numbers are written with as many digits as it takes to read back the same `f64`, times as exact decimals.
+//! On a real clock `links.csv` has the lateness of each delivery in its last column; in a simulated or stepped run that is
+//! empty. Numbers are written with as many digits as it takes to read back the same `f64`, times as exact decimals.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
+use bus::recording::Recording;
 use common::record::Record;
+
+use super::deliveries::Lateness;
 
 /// Writes the tables of a recording into a folder, row by row.
 pub struct Exporter<W: Write> {
@@ -34,7 +38,7 @@ const VEHICLES: [&str; 17] = [
     "psi_e_rad",
     "neighbours",
 ];
-const LINKS: [&str; 7] = ["sent_s", "due_s", "decided_s", "from", "to", "seq", "fate"];
+const LINKS: [&str; 8] = ["sent_s", "due_s", "decided_s", "from", "to", "seq", "fate", "late_s"];
 const TOPOLOGY: [&str; 4] = ["t_s", "from", "to", "up"];
 
 impl Exporter<BufWriter<File>> {
@@ -60,8 +64,9 @@ impl<W: Write> Exporter<W> {
         Ok(exporter)
     }
 
-    /// Writes one row into its table. The formation speed and warnings have none.
-    pub fn write(&mut self, record: &Record) -> io::Result<()> {
+    /// Writes one row into its table, and of a delivery how late it was, if that is known \[ns of wall clock\]. The formation
+    /// speed and warnings have no table.
+    pub fn write(&mut self, record: &Record, late_ns: Option<i64>) -> io::Result<()> {
         match record {
             Record::State(row) => {
                 let numbers = [
@@ -90,6 +95,7 @@ impl<W: Write> Exporter<W> {
                 &row.to,
                 row.seq,
                 row.fate.as_str(),
+                late_ns.map(seconds),
             ))?,
             Record::Topology(row) => self.topology.serialize((seconds(row.t_ns), &row.from, &row.to, row.up))?,
             Record::Speed(_) | Record::Warning(_) => {}
@@ -109,10 +115,15 @@ impl<W: Write> Exporter<W> {
 }
 
 /// Writes the tables of a recording into `directory`.
-pub fn export_csv<'a>(rows: impl IntoIterator<Item = &'a Record>, directory: impl AsRef<Path>) -> io::Result<()> {
+pub fn export_csv(recording: &Recording, directory: impl AsRef<Path>) -> io::Result<()> {
     let mut exporter = Exporter::create(directory)?;
-    for row in rows {
-        exporter.write(row)?;
+    let lateness = Lateness::of(&recording.clock);
+    for record in &recording.exact {
+        let late_ns = match record {
+            Record::Message(row) => lateness.late_ns(row),
+            _ => None,
+        };
+        exporter.write(record, late_ns)?;
     }
     exporter.finish().map(|_| ())
 }
@@ -130,11 +141,11 @@ pub(super) fn seconds(nanos: i64) -> String {
 mod tests {
     use super::*;
     use crate::results::testing::{fleet, state_row};
-    use common::record::{Fate, MessageRow, TopologyRow};
+    use common::record::{AchievedRow, ClockRecord, Fate, MessageRow, TopologyRow};
 
-    fn exported(rows: &[Record]) -> [String; 3] {
+    fn exported(rows: &[Record], late_ns: Option<i64>) -> [String; 3] {
         let mut exporter = Exporter::new(Vec::new(), Vec::new(), Vec::new()).expect("starts");
-        rows.iter().for_each(|row| exporter.write(row).expect("writes"));
+        rows.iter().for_each(|row| exporter.write(row, late_ns).expect("writes"));
         exporter.finish().expect("ends").map(|table| String::from_utf8(table).expect("text"))
     }
 
@@ -150,11 +161,13 @@ mod tests {
             due_ns: -1,
             fate: Fate::QueueFull,
         };
-        let [vehicles, links, topology] = exported(&[
+        let [_, late, _] = exported(&[Record::Message(message.clone())], Some(-2_500));
+        let rows = [
             Record::State(state_row(50_000_000, "v1", 0.1 + 0.2)),
             Record::Message(message),
             Record::Topology(TopologyRow { t_ns: 0, from: from.into(), to: to.into(), up: false }),
-        ]);
+        ];
+        let [vehicles, links, topology] = exported(&rows, None);
         assert_eq!(
             vehicles,
             "t_s,vehicle,xi,xi_rate,v_ref,x_m,y_m,z_m,yaw_rad,pitch_rad,roll_rad,speed_mps,e_along_m,e_cross_m,\
@@ -163,15 +176,16 @@ mod tests {
         );
         assert_eq!(
             links,
-            "sent_s,due_s,decided_s,from,to,seq,fate\n1.0,-0.000000001,1.250000001,a,\"b,c\",3,queue_full\n"
+            "sent_s,due_s,decided_s,from,to,seq,fate,late_s\n1.0,-0.000000001,1.250000001,a,\"b,c\",3,queue_full,\n"
         );
+        assert!(late.ends_with(",queue_full,-0.0000025\n"), "{late}");
         assert_eq!(topology, "t_s,from,to,up\n0.0,a,\"b,c\",false\n");
     }
 
     #[test]
     fn numbers_read_back_exactly() {
         let fleet = fleet(true);
-        let [vehicles, ..] = exported(&fleet.exact);
+        let [vehicles, ..] = exported(&fleet.exact, None);
         let mut states = fleet.exact.iter().filter_map(|record| match record {
             Record::State(row) => Some(row),
             _ => None,
@@ -188,8 +202,34 @@ mod tests {
     }
 
     #[test]
+    fn deliveries_on_a_real_clock_tell_how_late_they_were_and_simulated_ones_do_not() {
+        let mut fleet = fleet(true);
+        // The instant of the row is that of the delivery, as the emulator writes it.
+        let delivered = |record: &Record| match record {
+            Record::Message(row) => (row.fate == Fate::Delivered).then(|| row.clone()),
+            _ => None,
+        };
+        let row = fleet.exact.iter().find_map(delivered).expect("something was delivered");
+        let (from, to, commanded_ns) = (row.from, row.to, row.due_ns - row.sent_ns);
+        let achieved = AchievedRow { t_ns: row.t_ns, from, to, seq: row.seq, commanded_ns, late_ns: 31_000 };
+        fleet.clock = vec![ClockRecord::Achieved(achieved)];
+        let late = |fleet: &Recording| {
+            let folder = tempfile::tempdir().expect("a folder");
+            export_csv(fleet, folder.path()).expect("writes");
+            let mut table = csv::Reader::from_path(folder.path().join("links.csv")).expect("a table");
+            let rows = table.records().map(|line| line.expect("a line"));
+            rows.map(|line| (line[6].to_owned(), line[7].to_owned()))
+                .filter(|(_, late)| !late.is_empty())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(late(&fleet), [("delivered".to_owned(), "0.000031".to_owned())]);
+        fleet.clock.clear();
+        assert_eq!(late(&fleet), []);
+    }
+
+    #[test]
     fn a_folder_that_is_not_there_is_named() {
-        let error = export_csv([], "/nonexistent/folder").expect_err("refused").to_string();
+        let error = export_csv(&Recording::default(), "/nonexistent/folder").expect_err("refused").to_string();
         assert!(error.contains("/nonexistent/folder/vehicles.csv"), "{error}");
     }
 }

@@ -14,6 +14,7 @@ mod chart;
 mod clock;
 mod coordination;
 mod decay;
+mod deliveries;
 mod diff;
 pub(crate) mod drawing;
 mod export;
@@ -38,8 +39,9 @@ mod vehicle;
 mod verdict;
 
 pub use chart::{Chart, Curve};
-pub use clock::{ClockSummary, DeadlineSummary, DeliverySummary, NoteSummary, OverrunSummary, summarise_clock};
+pub use clock::{ClockSummary, DeadlineSummary, NoteSummary, OverrunSummary, summarise_clock};
 pub use coordination::CoordinationSummary;
+pub use deliveries::{DeliverySummary, LinkDeliveries};
 pub use diff::{Comparison, Outcome, Side, compare, diff, origins_differ};
 pub use export::{Exporter, export_csv};
 pub use facts::{Facts, VehicleFacts, Way};

@@ -41,6 +41,14 @@ pub(super) fn verdict(clock: &ClockSummary) -> Option<ClockVerdict> {
             }
             parts.push(part);
         }
+        // Nothing may be handed over before its time, by however little.
+        let never_early = deliveries.early == 0 && deliveries.least_late_s >= 0.0;
+        kept_time &= never_early;
+        parts.push(if never_early {
+            "never early".to_owned()
+        } else {
+            format!("{} early, by up to {}", deliveries.early, duration(-deliveries.least_late_s))
+        });
     }
     if met + missed > 0 {
         let within = missed as f64 <= MISSED_PART * (met + missed) as f64;
@@ -57,7 +65,7 @@ pub(super) fn verdict(clock: &ClockSummary) -> Option<ClockVerdict> {
 }
 
 fn duration(seconds: f64) -> String {
-    if seconds < 1e-3 { format!("{:.0} µs", seconds * 1e6) } else { format!("{:.2} ms", seconds * 1e3) }
+    if seconds.abs() < 1e-3 { format!("{:.0} µs", seconds * 1e6) } else { format!("{:.2} ms", seconds * 1e3) }
 }
 
 #[cfg(test)]
@@ -68,7 +76,8 @@ mod tests {
 
     fn clock(median: f64, p99: f64, missed: u64) -> ClockSummary {
         let spread = |median, p99| Spread { median, p99, max: 1.0 };
-        let deliveries = DeliverySummary { count: 9, commanded_s: spread(5.0, 5.0), late_s: spread(median, p99) };
+        let (commanded_s, late_s) = (spread(5.0, 5.0), spread(median, p99));
+        let deliveries = DeliverySummary { count: 9, early: 0, commanded_s, late_s, least_late_s: 0.0 };
         let deadlines = DeadlineSummary { vehicle: "a".into(), met: 1000 - missed, missed, worst_late_s: 0.0 };
         ClockSummary { deliveries: Some(deliveries), deadlines: vec![deadlines], ..ClockSummary::default() }
     }
@@ -81,7 +90,7 @@ mod tests {
     fn each_aim_that_is_missed_is_named() {
         assert_eq!(
             text(&clock(24e-6, 0.2e-3, 1)),
-            (true, "the machine kept time: p50 24 µs, p99 200 µs, 1 of 1000 deadlines missed".into())
+            (true, "the machine kept time: p50 24 µs, p99 200 µs, never early, 1 of 1000 deadlines missed".into())
         );
         for (clock, fault) in [
             (clock(0.84e-3, 0.9e-3, 0), "p50 840 µs > 50 µs"),
@@ -91,6 +100,16 @@ mod tests {
             let (kept, said) = text(&clock);
             assert!(!kept && said.starts_with("disturbed") && said.contains(fault), "{said}");
         }
+    }
+
+    #[test]
+    fn one_delivery_before_its_time_is_one_too_many() {
+        let mut clock = clock(24e-6, 0.2e-3, 0);
+        assert!(text(&clock).1.contains("never early"));
+        let deliveries = clock.deliveries.as_mut().expect("given above");
+        (deliveries.early, deliveries.least_late_s) = (2, -3e-6);
+        let (kept, said) = text(&clock);
+        assert!(!kept && said.contains("2 early, by up to 3 µs") && !said.contains("never"), "{said}");
     }
 
     #[test]

@@ -9,8 +9,8 @@ use super::graph::printed;
 use super::html::{STYLE, escape, inline, number, optional, percent, table, told};
 use super::verdict::verdict;
 use super::{
-    ClockSummary, DeadlineSummary, Facts, Figure, FleetSummary, GraphFacts, LinkSummary, MessageCounts, OverrunSummary,
-    Summary, VehicleSummary,
+    ClockSummary, DeadlineSummary, DeliverySummary, Facts, Figure, FleetSummary, GraphFacts, LinkSummary,
+    MessageCounts, OverrunSummary, Summary, VehicleSummary,
 };
 
 /// A line of the table "theory beside measurement".
@@ -262,24 +262,39 @@ fn network(page: &mut String, report: &Report<'_>) {
     };
     let mut header = vec!["link"];
     header.extend(columns.iter().map(|column| column.0));
-    header.extend(["delay [s]", "up", "longest outage [s]", "ledger"]);
+    // On a real clock the achieved delay stands beside the commanded one.
+    let clock = &report.clock.links;
+    if clock.is_empty() {
+        header.push("delay [s]");
+    } else {
+        header.extend(["commanded delay [s]", "late, median [ms]", "late, 99 % [ms]"]);
+    }
+    let late_ms = |deliveries: Option<&DeliverySummary>| {
+        let late = deliveries.map(|deliveries| deliveries.late_s);
+        [late.map(|late| late.median), late.map(|late| late.p99)].map(|late| optional(late.map(|s| s * 1e3), ""))
+    };
+    header.extend(["up", "longest outage [s]", "ledger"]);
     let row = |link: &LinkSummary| {
         let ledger =
             if link.balanced { "<span class=\"yes\">balanced</span>" } else { "<span class=\"no\">open</span>" };
         let mut cells = vec![format!("{}&nbsp;→&nbsp;{}", escape(&link.from), escape(&link.to))];
         cells.extend(counted(&link.messages));
-        cells.extend([
-            optional(link.delay.map(|delay| delay.median), ""),
-            percent(link.up_fraction),
-            number(link.longest_outage_s),
-            ledger.into(),
-        ]);
+        cells.push(optional(link.delay.map(|delay| delay.median), ""));
+        if !clock.is_empty() {
+            let own = clock.iter().find(|own| own.from == link.from && own.to == link.to);
+            cells.extend(late_ms(own.map(|own| &own.deliveries)));
+        }
+        cells.extend([percent(link.up_fraction), number(link.longest_outage_s), ledger.into()]);
         cells
     };
     let sum = (links.len() > 1).then(|| {
         let mut cells = vec!["all".to_owned()];
         cells.extend(counted(&totals.counts));
-        cells.extend(["", "", "", ""].map(str::to_owned));
+        cells.push(String::new());
+        if !clock.is_empty() {
+            cells.extend(late_ms(report.clock.deliveries.as_ref()));
+        }
+        cells.extend(["", "", ""].map(str::to_owned));
         cells
     });
     // A complete graph of two hundred vehicles would be a page of its own.
@@ -335,13 +350,14 @@ fn clock(page: &mut String, clock: &ClockSummary) {
         table(page, "numbers", &header, clock.deadlines.iter().map(row));
     }
     if let Some(deliveries) = &clock.deliveries {
-        let late = [deliveries.late_s.median, deliveries.late_s.p99, deliveries.late_s.max].map(|s| number(s * 1e3));
+        let spread = &deliveries.late_s;
+        let late = [spread.median, spread.p99, spread.max, deliveries.least_late_s].map(|s| number(s * 1e3));
         let commanded = number(deliveries.commanded_s.median);
         let _ = writeln!(
             page,
             "<p class=\"remark\">{} deliveries with a commanded delay of {commanded} s (median) came {} ms late \
-             (median), {} ms (99 %), {} ms (worst).</p>",
-            deliveries.count, late[0], late[1], late[2]
+             (median), {} ms (99 %), {} ms (worst), {} ms (least).</p>",
+            deliveries.count, late[0], late[1], late[2], late[3]
         );
     }
     if !clock.overruns.is_empty() {
@@ -427,6 +443,24 @@ mod tests {
             assert!(page.contains(text), "{text}");
         }
         assert!(page.contains("verdict good"));
+    }
+
+    #[test]
+    fn on_a_real_clock_each_link_has_its_lateness_beside_the_commanded_delay() {
+        let page = page(true, &[]);
+        let row = page.lines().find(|line| line.starts_with("<tr><td>v1&nbsp;→&nbsp;v2")).expect("a row");
+        assert!(page.contains("<th>commanded delay [s]</th><th>late, median [ms]</th><th>late, 99 % [ms]</th>"));
+        assert!(row.contains("<td>5</td><td>0.06</td><td>2</td>"), "{row}");
+        let other = page.lines().find(|line| line.starts_with("<tr><td>v2&nbsp;→&nbsp;v1")).expect("a row");
+        assert!(other.contains("<td>5</td><td>–</td><td>–</td>"), "{other}");
+        let (mut recording, facts) = (fleet(true), facts(true));
+        recording.clock.clear();
+        let (summary, clock) = (summarise(&recording, &facts), summarise_clock(&recording));
+        let (facts, mission_toml) = (&facts, "");
+        let (figures, theory, notes, reproduce) = (&[], &[], &[], &[]);
+        let report =
+            Report { facts, summary: &summary, clock: &clock, figures, theory, notes, reproduce, mission_toml };
+        assert!(super::report(&report).contains("<th>delay [s]</th><th>up</th>"));
     }
 
     #[test]

@@ -68,7 +68,7 @@ mod tests {
     fn message((due, sent, from): (i64, i64, usize), number: u64) -> UnderWay {
         let parcel = Parcel { from, seq: 0, number, sent: Time::from_nanos(sent), bytes: [].into() };
         let due = Time::from_nanos(due);
-        UnderWay { due, parcel, link: 0, copy: false, corrupt: false, reception: None }
+        UnderWay { due, parcel, link: 0, copy: false, copy_due: None, corrupt: false, reception: None }
     }
 
     proptest! {

@@ -36,6 +36,9 @@ impl Emulator {
         while let Some(message) = self.under_way.pop() {
             let fate = if message.copy { Fate::CopyInFlight } else { Fate::InFlight };
             self.record_message(now, &message, fate);
+            if let Some(copy) = message.copy() {
+                self.record_message(now, &copy, Fate::CopyInFlight);
+            }
         }
         self.turns.clear();
         for vehicle in 0..self.senders.len() {
@@ -82,5 +85,5 @@ pub(super) fn settled(t: Time, message: &UnderWay, fate: Fate, late_ns: Option<i
 
 /// A message that never left its sender.
 pub(super) fn unsent(now: Time, parcel: &Parcel, link: usize) -> UnderWay {
-    UnderWay { due: now, parcel: parcel.clone(), link, copy: false, corrupt: false, reception: None }
+    UnderWay { due: now, parcel: parcel.clone(), link, copy: false, copy_due: None, corrupt: false, reception: None }
 }

@@ -253,16 +253,17 @@ impl Emulator {
         let bits = 8 * parcel.bytes.len();
         let verdict = wire.decide(parcel.seq, bits, (start, airtime), distance);
         let (due, corrupt) = (verdict.due, verdict.flipped.is_some());
-        let mut message = UnderWay { due, parcel: parcel.clone(), link, copy: false, corrupt, reception: None };
+        let copy_due = verdict.copy;
+        let mut message =
+            UnderWay { due, parcel: parcel.clone(), link, copy: false, copy_due, corrupt, reception: None };
         if let Some(cause) = verdict.dropped {
             return self.settle(start, &message, cause);
         }
         if let Some(bit) = verdict.flipped {
             message.parcel.bytes = flip(&parcel.bytes, bit);
         }
-        if let Some(due) = verdict.copy {
+        if copy_due.is_some() {
             wire.ledger.copy();
-            self.under_way.push(UnderWay { due, copy: true, ..message.clone() });
         }
         if let Some(medium) = &self.mission.medium {
             let place = Place { begin: due - airtime, key: self.receptions };
@@ -274,7 +275,8 @@ impl Emulator {
     }
 
     /// A message has come to the end of its way: it is received if the link is up at that instant (p(t) gates reception,
-    /// erratum 4.22), its receiver is there, and nothing spoilt it meanwhile.
+    /// erratum 4.22), its receiver is there, and nothing spoilt it meanwhile. A copy is made of what arrives: what does not
+    /// has none.
     fn arrive(&mut self, now: Time, message: UnderWay) {
         let to = self.links[message.link].to;
         let spoilt = message.reception.and_then(|place| self.airs[to].leave(place));
@@ -295,12 +297,18 @@ impl Emulator {
             .watch_delays
             .filter(|_| fate == Fate::Delivered)
             .map(|speed_up| ((now - message.due).nanos() as f64 / speed_up) as i64);
-        let mut settled = Some(settled(message.due, &message, fate, late_ns));
+        let (due, copy) = (message.due, message.copy());
+        let mut settled = Some(settled(due, &message, fate, late_ns));
         if late_ns.is_none() {
             self.outputs.extend(settled.take().map(Channel::Settled));
         }
         if handed_over {
-            self.outputs.push_back(Channel::Deliver { to, due: message.due, bytes: message.parcel.bytes, settled });
+            self.outputs.push_back(Channel::Deliver { to, due, bytes: message.parcel.bytes, settled });
+        }
+        match copy {
+            Some(copy) if handed_over => self.under_way.push(copy),
+            Some(copy) => self.settle(due, &copy, Fate::CopyDropped),
+            None => {}
         }
     }
 

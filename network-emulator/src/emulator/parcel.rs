@@ -28,6 +28,8 @@ pub(super) struct UnderWay {
     pub(super) link: usize,
     /// A second copy that the network made.
     pub(super) copy: bool,
+    /// When a second copy of it is due, if it arrives itself.
+    pub(super) copy_due: Option<Time>,
     /// A bit is flipped.
     pub(super) corrupt: bool,
     /// Its entry in the receiver's [`Air`](super::air::Air), if the medium is shared.
@@ -35,6 +37,12 @@ pub(super) struct UnderWay {
 }
 
 impl UnderWay {
+    /// The second copy of it that the network makes, if it makes one. It was heard already, so it is nothing on the air.
+    pub(super) fn copy(&self) -> Option<UnderWay> {
+        let copy = |due| UnderWay { due, copy: true, copy_due: None, reception: None, ..self.clone() };
+        self.copy_due.map(copy)
+    }
+
     /// Messages due at the same instant arrive by instant of sending, then sender, then number: an order that does not
     /// depend on when which of them was taken.
     fn key(&self) -> (Time, Time, usize, u64, usize, bool) {

@@ -250,13 +250,54 @@ fn in_order_no_message_overtakes_an_earlier_one() {
         let words: Vec<(f64, u16, u32)> = (0..200).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
         let (_, outputs) = run(&mission, &words, 60.0);
         let arrived = |output: &Channel| match output {
-            Channel::Settled(settled) => Some((settled.due_ns, settled.seq)),
+            Channel::Settled(settled) if !settled.fate.is_of_copy() => Some((settled.due_ns, settled.seq)),
             _ => None,
         };
         let arrived: Vec<(i64, u64)> = outputs.iter().filter_map(arrived).collect();
         assert_eq!(arrived.iter().map(|(_, seq)| seq).is_sorted(), sorted, "{order}");
         assert!(arrived.iter().map(|(due, _)| due).is_sorted());
     }
+}
+
+#[test]
+fn copies_hold_no_original_back_nor_take_its_place() {
+    for more in ["order = \"in_order\"", "queue = 5", "order = \"in_order\"\nqueue = 7", "order = \"free\""] {
+        let with_copies = |probability: f64| {
+            let mission = mission(&format!(
+                "delay = {{ jittered = {{ min_s = 0.1, max_s = 2.0 }} }}\n{more}\nduplicate_probability = {probability:?}"
+            ));
+            let words: Vec<(f64, u16, u32)> = (0..400).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
+            let (emulator, outputs) = run(&mission, &words, 60.0);
+            let row = |output: &Channel| match output {
+                Channel::Settled(settled) => Some((settled.seq, settled.due_ns, settled.fate)),
+                _ => None,
+            };
+            let (copies, originals): (Vec<_>, Vec<_>) =
+                outputs.iter().filter_map(row).partition(|(_, _, fate)| fate.is_of_copy());
+            (emulator.ledgers().next().map_or(0, |ledger| ledger.copies), copies, originals)
+        };
+        let ((none, ..), (made, copies, originals)) = (with_copies(0.0), with_copies(0.9));
+        assert!(none == 0 && made > 100, "{made}");
+        assert!(with_copies(0.0).2 == originals, "the originals fare as without copies, {more}");
+        let overtaken = |copy: &(u64, i64, Fate)| originals.iter().any(|other| other.0 > copy.0 && other.1 < copy.1);
+        assert!(copies.iter().any(overtaken), "a copy that is late lets others pass");
+        let first = |copy: &(u64, i64, Fate)| originals.iter().any(|own| own.0 == copy.0 && own.1 <= copy.1);
+        assert!(copies.iter().all(first), "and none comes before its original");
+    }
+}
+
+#[test]
+fn there_are_no_more_copies_under_way_than_places_in_the_queue() {
+    let mission =
+        mission("delay = { jittered = { min_s = 1.0, max_s = 60.0 } }\nqueue = 3\nduplicate_probability = 1.0");
+    let words: Vec<(f64, u16, u32)> = (0..900).map(|seq| (f64::from(seq) * 0.1, 0, seq)).collect();
+    let mut emulator = Emulator::new(mission.clone(), None);
+    for (at, _, seq) in words {
+        emulator.handle(seconds(at), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+        emulator.handle(seconds(at), None);
+        assert!(emulator.ledgers().all(|ledger| ledger.in_flight <= 3 && ledger.copies_in_flight <= 3));
+    }
+    assert!(emulator.ledgers().next().is_some_and(|ledger| ledger.copies > 3));
 }
 
 #[test]
@@ -313,6 +354,75 @@ fn a_second_copy_is_delivered_and_has_a_ledger_of_its_own() {
     assert_eq!(deliveries(&outputs).len() as u64, ledger.sent + ledger.copies);
     let share = ledger.copies as f64 / f64::from(n);
     assert!((share - 0.25).abs() < 5.0 * (0.25f64 * 0.75 / f64::from(n)).sqrt(), "{share}");
+}
+
+/// Every copy that was heard, and every original; by link and number.
+fn heard(outputs: &[Channel]) -> [BTreeSet<(usize, u64)>; 2] {
+    [Fate::Copied, Fate::Delivered].map(|wanted| {
+        let heard = |output: &Channel| match output {
+            Channel::Settled(settled) => (settled.fate == wanted).then_some((settled.link, settled.seq)),
+            _ => None,
+        };
+        outputs.iter().filter_map(heard).collect()
+    })
+}
+
+#[test]
+fn what_is_spoilt_on_the_air_has_no_copy_that_is_heard() {
+    // All speak at once, at every multiple of half a second: everybody is deaf, or v2 hears two at a time.
+    let words: Vec<(f64, u16, u32)> =
+        (0..150).flat_map(|seq| (0..3).map(move |who| (0.5 * f64::from(seq), who, seq))).collect();
+    for (more, cause, spoilt) in [
+        ("half_duplex = true, collisions = true", Fate::HalfDuplex, [true; 4]),
+        ("collisions = true", Fate::Collision, [true, false, false, true]),
+    ] {
+        let mission = mission(&format!("duplicate_probability = 0.5\nmedium = {{ rate_bps = 2000.0, {more} }}"));
+        let (emulator, outputs) = run(&mission, &words, 90.0);
+        for (ledger, spoilt) in emulator.ledgers().zip(spoilt) {
+            assert!(ledger.copies > 30, "{ledger:?}");
+            let fate = if spoilt { Fate::CopyDropped } else { Fate::Copied };
+            assert_eq!(
+                (ledger.of(cause), ledger.of(fate)),
+                (if spoilt { 150 } else { 0 }, ledger.copies),
+                "{ledger:?}"
+            );
+        }
+        let [copies, originals] = heard(&outputs);
+        assert!(copies.is_subset(&originals));
+    }
+}
+
+#[test]
+fn a_copy_is_made_of_what_arrives_and_then_meets_the_link_as_it_is() {
+    // Originals take 1 s, copies 1 s or, as late as they please, up to 3 s; the link is up in [0, 2) of every 4 s.
+    let mission = mission(
+        "delay = { jittered = { min_s = 1.0, max_s = 3.0 } }\nduplicate_probability = 1.0\n\
+         switching = { periodic = { period_s = 4.0, up_from_s = 0.0, up_for_s = 2.0 } }",
+    );
+    let words: Vec<(f64, u16, u32)> = (0..900).map(|seq| (0.1 * f64::from(seq), 0, seq)).collect();
+    let (emulator, outputs) = run(&mission, &words, 99.0);
+    let ledger = emulator.ledgers().next().copied().expect("a link");
+    assert_eq!((ledger.copies, ledger.copies_in_flight), (900, 0));
+    let [copies, originals] = heard(&outputs);
+    assert!(copies.is_subset(&originals) && copies.len() < originals.len(), "some come when the link is down");
+    assert!(copies.len() as u64 == ledger.of(Fate::Copied) && ledger.of(Fate::Copied) > 100, "{ledger:?}");
+    // What becomes of a copy whose original does not arrive is decided with it.
+    let decided = |fate: Fate| -> BTreeSet<(u64, i64)> {
+        let row = |output: &Channel| match output {
+            Channel::Settled(settled) => (settled.fate == fate).then_some((settled.seq, settled.t_ns)),
+            _ => None,
+        };
+        outputs.iter().filter_map(row).collect()
+    };
+    assert!(decided(Fate::LinkDown).is_subset(&decided(Fate::CopyDropped)));
+}
+
+#[test]
+fn at_the_end_a_message_under_way_and_its_copy_are_both_in_flight() {
+    let mission = mission("delay = { constant = { delay_s = 2.0 } }\nduplicate_probability = 1.0");
+    let (mut emulator, _) = run(&mission, &[(1.0, 0, 0)], 2.0);
+    emulator.finish(seconds(2.0));
+    assert_eq!(fates(&drain(&mut emulator), "v1", "v2"), [(0, Fate::InFlight), (0, Fate::CopyInFlight)]);
 }
 
 #[test]
@@ -514,6 +624,23 @@ fn who_is_absent_hears_nothing_and_its_links_are_down_until_it_is_back() {
 }
 
 #[test]
+fn who_is_absent_when_a_message_arrives_gets_no_copy_of_it_either() {
+    let mission = mission("delay = { jittered = { min_s = 1.0, max_s = 60.0 } }\nduplicate_probability = 1.0");
+    let mut emulator = Emulator::new(mission.clone(), Some(1.0));
+    emulator.presence(seconds(0.0), 1, false);
+    for seq in 0..50 {
+        emulator.handle(seconds(0.5), Some(Sent { from: 0, bytes: state(&mission, 0, seq) }));
+    }
+    // Back halfway: of what arrives from now on there are copies, of what came before there are none.
+    emulator.presence(seconds(30.0), 1, true);
+    emulator.handle(seconds(99.0), None);
+    let ledger = emulator.ledgers().next().copied().expect("v1->v2");
+    let (absent, delivered) = (ledger.of(Fate::ReceiverAbsent), ledger.delivered());
+    assert!(absent > 10 && delivered > 10 && absent + delivered == 50, "{ledger:?}");
+    assert_eq!((ledger.of(Fate::CopyDropped), ledger.of(Fate::Copied)), (absent, delivered));
+}
+
+#[test]
 fn a_link_may_have_an_order_and_a_queue_of_its_own() {
     let exceptions = "[[network.exceptions]]\nfrom = \"v1\"\nto = \"v2\"\nqueue = 2\n\
                       [[network.exceptions]]\nfrom = \"v3\"\nto = \"v2\"\norder = \"free\"";
@@ -642,6 +769,7 @@ proptest! {
         let mut now = Time::ZERO;
         let mut seq = [0; 3];
         let (mut delivered, mut made) = (0, 0);
+        let (mut copies, mut originals) = (BTreeSet::new(), BTreeSet::new());
         for (who, wait_ms) in steps {
             now += Span::from_nanos(i64::from(wait_ms) * 1_000_000);
             if who < 3 {
@@ -656,6 +784,10 @@ proptest! {
             prop_assert!(deliveries(&outputs).iter().all(|(_, due)| *due <= now));
             prop_assert!(deliveries(&outputs).is_sorted_by_key(|(_, due)| *due));
             prop_assert!(emulator.ledgers().all(Ledger::balances));
+            let [heard_again, heard] = heard(&outputs);
+            copies.extend(heard_again);
+            originals.extend(heard);
+            prop_assert!(copies.is_subset(&originals), "a copy is made of what was heard");
             delivered += deliveries(&outputs).len() as u64;
             let [sent, ..] = emulator.totals();
             prop_assert_eq!(sent, made, "every message is taken for every link, once");

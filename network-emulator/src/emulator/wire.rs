@@ -29,15 +29,35 @@ pub(super) struct Wire {
     duplicate: f64,
     corrupt: f64,
     in_order: bool,
-    /// Most messages under way.
+    /// Most messages under way, and most copies.
     queue: usize,
     /// Whether distances make any difference.
     pub(super) needs_distance: bool,
-    /// When each message that takes a place in the queue leaves it. Kept apart from the ledger: a stepped run settles
-    /// arrivals ahead of what is sent before them, and must find the same queue as a run in real time.
-    places: BinaryHeap<Reverse<Time>>,
-    /// When the latest message so far arrives.
+    messages: Places,
+    /// Copies have places of their own, so that they take none from what was sent.
+    copies: Places,
+    /// When the latest message so far arrives; copies hold nothing back.
     latest: Time,
+}
+
+/// The places of a queue, by when each is free again. Kept apart from the ledger: a stepped run settles arrivals ahead of
+/// what is sent before them, and must find the same queue as a run in real time.
+#[derive(Default)]
+struct Places(BinaryHeap<Reverse<Time>>);
+
+impl Places {
+    /// How many are taken at this instant. What is due at this very instant is still there: the network takes what was
+    /// sent before it delivers.
+    fn taken(&mut self, now: Time) -> usize {
+        while self.0.peek().is_some_and(|Reverse(due)| *due < now) {
+            self.0.pop();
+        }
+        self.0.len()
+    }
+
+    fn take(&mut self, until: Time) {
+        self.0.push(Reverse(until));
+    }
 }
 
 struct Layer {
@@ -82,7 +102,8 @@ impl Wire {
             in_order: link.in_order,
             queue: link.queue,
             needs_distance: link.needs_distance(),
-            places: BinaryHeap::new(),
+            messages: Places::default(),
+            copies: Places::default(),
             latest: Time::from_nanos(i64::MIN),
         }
     }
@@ -108,15 +129,11 @@ impl Wire {
         if self.in_order {
             due = due.max(self.latest);
         }
-        // What is due at this very instant is still there: the network takes what was sent before it delivers.
-        while self.places.peek().is_some_and(|Reverse(due)| *due < start) {
-            self.places.pop();
-        }
         let dropped = if first[RANGE] >= self.range.success(distance) {
             Some(Fate::OutOfRange)
         } else if lost {
             Some(Fate::Lost)
-        } else if self.places.len() >= self.queue {
+        } else if self.messages.taken(start) >= self.queue {
             Some(Fate::QueueFull)
         } else {
             None
@@ -125,23 +142,19 @@ impl Wire {
         if dropped.is_some() {
             return verdict;
         }
-        self.occupy(due);
+        self.messages.take(due);
+        self.latest = due.max(self.latest);
         if first[CORRUPT] < self.corrupt {
             // Given that it is below the probability, the number is uniform up to it.
             verdict.flipped =
                 Some(((first[CORRUPT] / self.corrupt * bits as f64) as usize).min(bits.saturating_sub(1)));
-        } else if first[DUPLICATE] < self.duplicate && self.places.len() < self.queue {
+        } else if first[DUPLICATE] < self.duplicate && self.copies.taken(start) < self.queue {
             // A copy does not come before its original.
             let due = (start + airtime + delay_of_copy).max(due);
-            self.occupy(due);
+            self.copies.take(due);
             verdict.copy = Some(due);
         }
         verdict
-    }
-
-    fn occupy(&mut self, due: Time) {
-        self.places.push(Reverse(due));
-        self.latest = self.latest.max(due);
     }
 }
 
