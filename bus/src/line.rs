@@ -129,7 +129,8 @@ impl Line {
         let (events, receiver) = queue(config.queue);
         let (signals, orders) = mpsc::channel();
         let tally = Arc::new(Tally::of("the network-emulator"));
-        let shared = Arc::new(Shared { id: config.id, tally, inbox: Mutex::default(), leaving: AtomicBool::new(false) });
+        let shared =
+            Arc::new(Shared { id: config.id, tally, inbox: Mutex::default(), leaving: AtomicBool::new(false) });
         let mut keeper = Keeper {
             endpoint: config.endpoint,
             // A number that no other incarnation of this participant has; the standard library's hasher has a seed.

@@ -151,8 +151,7 @@ impl Logs {
             earlier = ends_of(&files);
         }
         let origin = origin(mission, start_unix_ns);
-        let (path, recorder) =
-            Recorder::create_next(&folder, &self.stem, &origin).map_err(|error| refused(&error))?;
+        let (path, recorder) = Recorder::create_next(&folder, &self.stem, &origin).map_err(|error| refused(&error))?;
         tracing::debug!("recording in {}", path.display());
         let (to_disk, queue) = sync_channel(QUEUE);
         let vehicles = mission.vehicles.iter().map(|vehicle| Name::from(vehicle.id.as_str())).collect::<Vec<_>>();

@@ -57,7 +57,8 @@ fn python_reads_whole_and_cut_recordings() {
     }
     let directory = tempfile::tempdir().expect("directory");
     let whole = directory.path().join("whole.mcap");
-    let origin = Origin { mission_toml: "name = \"helix\"\n".into(), digest: "abc".into(), seed: 42, start_unix_ns: None };
+    let origin =
+        Origin { mission_toml: "name = \"helix\"\n".into(), digest: "abc".into(), seed: 42, start_unix_ns: None };
     let mut recorder = Recorder::create(&whole, &origin).expect("starts");
     for (count, row) in rows().enumerate() {
         recorder.write(&row).expect("writes");

@@ -568,7 +568,10 @@ mod tests {
         let mut waiting = status(Phase::Armed, HELIX, Phase::Armed);
         waiting.vehicles[2].connected = false;
         let said = hears(&mut conduct, 61.0, FromFleet::Status(waiting));
-        assert!(matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)") && r.contains("start with: vehicle-node --id auv3 ")), "{said:?}");
+        assert!(
+            matches!(&said[..], [ConductOutput::Failed(r)] if r.contains("auv3 (not connected)") && r.contains("start with: vehicle-node --id auv3 ")),
+            "{said:?}"
+        );
     }
 
     #[test]
@@ -633,7 +636,10 @@ mod tests {
         let landing = Landing { phase: Phase::Finished, pace: None, missing, aborted: Vec::new() };
         let told: Vec<String> = landing.missing_logs_of(Path::new("runs/x"), 0xabc).collect();
         assert_eq!(told[0], "log of auv2: it has no log of this mission");
-        assert!(told[1].starts_with("log of auv3: it did not answer; it is on the machine of auv3 in LOGS/0000000000000abc"));
+        assert!(
+            told[1]
+                .starts_with("log of auv3: it did not answer; it is on the machine of auv3 in LOGS/0000000000000abc")
+        );
         assert!(told[1].ends_with("mission-control report runs/x --logs LOGS"), "{}", told[1]);
     }
 }

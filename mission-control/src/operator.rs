@@ -6,8 +6,8 @@ use bus::Plane;
 use bus::line::{Line, LineConfig, LineEvent};
 use bus::queue::{Events, Wake, recv_until};
 use bus::setup::Endpoint;
-use common::wire;
 use common::time::Time;
+use common::wire;
 use common::wire::fleet::{FleetStatus, FromFleet, ToFleet, VehicleStatus};
 use common::wire::vehicle::Phase;
 use network_emulator::hub::OPERATOR;
@@ -81,7 +81,10 @@ pub fn describe(status: &FleetStatus) -> String {
         true => format!(" since {:.1} s, when the network-emulator came back", status.counted_from.secs()),
         false => String::new(),
     };
-    let _ = writeln!(text, "messages{since}: {sent} sent = {delivered} delivered + {dropped} dropped + {in_flight} in flight");
+    let _ = writeln!(
+        text,
+        "messages{since}: {sent} sent = {delivered} delivered + {dropped} dropped + {in_flight} in flight"
+    );
     if let Some(so_far) = mission.as_ref().and_then(|mission| crate::theory::so_far(mission, status)) {
         let _ = writeln!(text, "{so_far}");
     }

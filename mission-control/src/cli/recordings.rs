@@ -7,8 +7,8 @@ use clap::ValueEnum;
 use common::mission::Mission;
 
 use super::{End, Ended};
-use crate::{brought, folder};
 use crate::results::{compare, export_csv, network_section};
+use crate::{brought, folder};
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Format {
@@ -89,11 +89,14 @@ pub(super) fn recover(path: &Path, out: Option<PathBuf>) -> Ended {
 fn recover_run(run: &Path, out: Option<PathBuf>) -> Ended {
     let name = run.display();
     if !run.join(folder::MISSION).exists() {
-        let text = format!("{name} is no run folder: it has no {}; allowed: a run folder, or one recording", folder::MISSION);
+        let text =
+            format!("{name} is no run folder: it has no {}; allowed: a run folder, or one recording", folder::MISSION);
         return Err(End(4, text));
     }
     if out.is_some() {
-        let text = format!("--out: found with {name}, a run folder, whose recording is made in it; allowed: with one recording");
+        let text = format!(
+            "--out: found with {name}, a run folder, whose recording is made in it; allowed: with one recording"
+        );
         return Err(End(2, text));
     }
     let recording = run.join(folder::RECORDING);

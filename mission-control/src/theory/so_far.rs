@@ -154,7 +154,9 @@ fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
             let last = of.and_then(|of| of.said).map(|(made, _)| made);
             let since = last.map_or(String::new(), |made| format!(" since {:.1} s", made.secs()));
             match of {
-                Some(of) if of.phase == Phase::Aborted && of.reason == STOPPED => Some(format!("{} was stopped", plan.id)),
+                Some(of) if of.phase == Phase::Aborted && of.reason == STOPPED => {
+                    Some(format!("{} was stopped", plan.id))
+                }
                 Some(of) if of.phase == Phase::Aborted => Some(format!("{} gave up{}", plan.id, because(&of.reason))),
                 Some(of) if !of.connected => Some(format!("{} is not connected, silent{since}", plan.id)),
                 None => Some(format!("{} is not connected", plan.id)),
@@ -230,8 +232,14 @@ mod tests {
         let so_far = so_far(&mission, &near).expect("time has passed");
         assert!(so_far.verdict.starts_with("covered by Theorem 4.4"), "{}", so_far.verdict);
         assert!((so_far.error.expect("all spoke") - 0.02f64.sqrt()).abs() < 1e-9);
-        assert!(so_far.to_string().contains("coordination error now: ‖e‖ = 0.1414, max |x_i − x_j| = 0.2;"), "{so_far}");
-        assert!(so_far.to_string().contains("network so far, as planned: α = ") && so_far.to_string().contains("less than 0.625 s will do"));
+        assert!(
+            so_far.to_string().contains("coordination error now: ‖e‖ = 0.1414, max |x_i − x_j| = 0.2;"),
+            "{so_far}"
+        );
+        assert!(
+            so_far.to_string().contains("network so far, as planned: α = ")
+                && so_far.to_string().contains("less than 0.625 s will do")
+        );
         assert!(so_far.to_string().contains("dwell time 2.500 s") && so_far.margins.len() >= 5, "{so_far}");
         let (mission, far) = at(60.0, [10.0, 30.0, 90.0], [true; 3]);
         let so_far = super::so_far(&mission, &far).expect("time has passed");

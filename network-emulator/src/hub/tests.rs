@@ -179,7 +179,10 @@ fn a_real_flight_ends_when_no_vehicle_flies_any_more() {
     assert_eq!(hub.phase(), Phase::Running, "auv3 flies on");
     let said = ended(&mut hub, 1.2, "auv3", "it has diverged");
     assert_eq!(hub.phase(), Phase::Aborted);
-    assert!(said.contains(&HubOutput::CloseLog) && notes(&said).contains(&"flight ended: no vehicle flies any more"), "{said:?}");
+    assert!(
+        said.contains(&HubOutput::CloseLog) && notes(&said).contains(&"flight ended: no vehicle flies any more"),
+        "{said:?}"
+    );
 }
 
 #[test]

@@ -33,9 +33,13 @@ impl Margin {
         let Margin { statement, quantity, value, limit } = self;
         let percent = |part: &f64| 100.0 * part;
         match *quantity {
-            AGE => format!("news of a neighbour is at most {value:.3} s old when it is used; less than {limit:.3} s will do"),
+            AGE => format!(
+                "news of a neighbour is at most {value:.3} s old when it is used; less than {limit:.3} s will do"
+            ),
             AGE_BY_RATE => {
-                format!("while news is that old, vehicles go at most {value:.3} of the way they have to; less than {limit:.3} will do")
+                format!(
+                    "while news is that old, vehicles go at most {value:.3} of the way they have to; less than {limit:.3} will do"
+                )
             }
             UNHEARD => format!(
                 "{:.1} % of the time in which a link is up goes by unheard; less than {:.1} % will do",

@@ -217,8 +217,7 @@ impl Watch {
     fn exchange(&mut self, speed: f64) -> bool {
         let Some(Exchange { age, shortest_up, unheard }) = self.seen.exchange else { return true };
         let fresh = self.asks(IN_PERIODS, AGE, age.secs(), SMALL * shortest_up.secs());
-        let calm =
-            speed == 0.0 || self.asks(IN_PERIODS, AGE_BY_RATE, age.secs() * speed, 1.0);
+        let calm = speed == 0.0 || self.asks(IN_PERIODS, AGE_BY_RATE, age.secs() * speed, 1.0);
         let heard = self.asks(IN_PERIODS, UNHEARD, unheard, SMALL);
         fresh && calm && heard
     }
