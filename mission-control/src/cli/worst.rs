@@ -16,13 +16,13 @@ pub(super) struct WorstArgs {
     /// The mission file; if its own switching is admitted, the search begins with it
     mission: PathBuf,
     /// Share of the time that may be lost in the long run, 0 to below 1
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = super::number)]
     alpha: f64,
     /// Connectivity-loss bound T_0 (s)
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = super::number)]
     t0: f64,
     /// Least time between two changes (s)
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = super::number)]
     dwell: f64,
     /// What counts as hurt
     #[arg(long, value_enum, default_value = "end")]

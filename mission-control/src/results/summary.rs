@@ -337,6 +337,22 @@ mod tests {
     }
 
     #[test]
+    fn who_hears_of_a_stop_before_the_others_is_not_lost() {
+        let until = |last_s: i64, planned_s: f64| {
+            let mut recording = fleet(true);
+            let late = |record: &Record| match record {
+                Record::State(row) => *row.vehicle == *"v2" && row.t_ns > last_s * 1_000_000_000,
+                Record::Message(row) => *row.from == *"v2" && row.sent_ns > last_s * 1_000_000_000,
+                _ => false,
+            };
+            recording.exact.retain(|record| !late(record));
+            summarise(&recording, &Facts { planned_s, ..facts(true) }).fleet.lost.len()
+        };
+        assert_eq!((until(390, 800.0), until(390, 400.0)), (0, 1));
+        assert_eq!(until(300, 800.0), 1);
+    }
+
+    #[test]
     fn a_vehicle_that_falls_silent_is_absent() {
         let mut recording = fleet(true);
         assert_eq!(summarise(&recording, &facts(true)).fleet.absences, []);
