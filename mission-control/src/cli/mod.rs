@@ -17,6 +17,7 @@ use self::fleet::FleetArgs;
 use self::flight::RunArgs;
 use self::recordings::Format;
 use self::worst::WorstArgs;
+use crate::folder::quoted;
 use crate::waypoints;
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
@@ -289,12 +290,6 @@ fn run(what: What) -> Ended {
 /// A number, as given on a command line.
 fn number(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "allowed: a number, such as 0.4".to_string())
-}
-
-/// A word of a command as a shell takes it.
-fn quoted(word: String) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
-    if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
 #[cfg(test)]
