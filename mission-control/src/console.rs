@@ -41,7 +41,8 @@ impl Progress {
             }
             None => {
                 if self.last_step != step || self.last_line.elapsed() >= PLAIN_PERIOD {
-                    bus::remark!("{step}: {:.0} of {:.0} s  {message}", now.secs().max(0.0), self.end.secs());
+                    let line = format!("{step}: {:.0} of {:.0} s  {message}", now.secs().max(0.0), self.end.secs());
+                    bus::remark!("{}", line.trim_end());
                     self.last_line = Instant::now();
                     self.last_step = step.to_string();
                 }
@@ -162,7 +163,8 @@ impl Count {
                 bar.set_message(format!("{left} {message}"));
             }
             None if self.last_line.elapsed() >= PLAIN_PERIOD => {
-                bus::remark!("{}: {} of {}{left} {message}", self.step, self.reached, self.of);
+                let line = format!("{}: {} of {}{left} {message}", self.step, self.reached, self.of);
+                bus::remark!("{}", line.trim_end());
                 self.last_line = Instant::now();
             }
             None => {}

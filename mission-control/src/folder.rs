@@ -204,12 +204,12 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     facts.commanded = commanded(&mission, &recording.exact);
     // A recording by itself has no host facts beside it.
     let host = host_of(folder);
+    let reproduce = reproduce(folder, &mission, &recording, host.as_ref());
     let made = |host: &HostFacts| format!("Made by {} on {}, {} UTC.", host.how, host.host, host.written);
     let mut notes: Vec<String> = host.iter().map(made).collect();
     let added = host.iter().filter(|host| !host.added.is_empty());
     notes.extend(added.map(|host| format!("Logs added afterwards: {}.", host.added.join(", "))));
     (facts.missing, facts.aborted) = host.map_or_else(Default::default, |host| (host.missing, host.aborted));
-    let reproduce = reproduce(folder, &mission, &recording);
     let account = Account { notes, reproduce };
     let theory = |summary: &Summary| Theory {
         rows: theory::rows(&mission, Some(summary)),
@@ -220,8 +220,21 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
 }
 
 /// What makes a run again: the mission as flown, and the speeds that were commanded under way, which are not in it.
-fn reproduce(folder: &Path, mission: &Mission, recording: &Recording) -> Vec<String> {
+fn reproduce(folder: &Path, mission: &Mission, recording: &Recording, host: Option<&HostFacts>) -> Vec<String> {
     let mut lines = vec![format!("mission-control simulate {}", folder.join(MISSION).display())];
+    if let Some((host, words)) = host.and_then(|host| Some((host, of_run(&host.command)?))) {
+        let numbers = match host.speed_up {
+            None => "# The same numbers, in one thread:",
+            Some(_) => {
+                "# The same mission and seed without the clock, in one thread (what the machine did to the run is not in it):"
+            }
+        };
+        lines.insert(0, numbers.to_owned());
+        let out = words.iter().any(|word| word.starts_with("--out"));
+        let elsewhere = if out { ", with another folder behind --out" } else { "" };
+        lines.push(format!("# The run itself, from where it was flown{elsewhere}:"));
+        lines.push(format!("mission-control {}", words.join(" ")));
+    }
     let planned = mission.speed.steps();
     let commanded = commanded(mission, &recording.exact);
     let Some((first, _)) = commanded.first().copied() else { return lines };
@@ -235,6 +248,18 @@ fn reproduce(folder: &Path, mission: &Mission, recording: &Recording) -> Vec<Str
     lines.push("[formation]".to_string());
     lines.push(format!("profile = [{}]", steps.join(", ")));
     lines
+}
+
+/// The words behind the program's name as a shell takes them, if the command was `run`.
+fn of_run(command: &[String]) -> Option<Vec<String>> {
+    let words: Vec<String> = command.iter().skip(1).cloned().map(quoted).collect();
+    (words.first()? == "run").then_some(words)
+}
+
+/// A word of a command as a shell takes it.
+pub(crate) fn quoted(word: String) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
+    if word.chars().all(plain) && !word.is_empty() { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
 /// The logs of a fleet of its own below a run folder, of the mission that the folder holds.
@@ -369,14 +394,35 @@ mod tests {
         let row = |t_s: i64, speed| Record::Speed(SpeedRow { t_ns: t_s * 1_000_000_000, speed });
         let recording = |rows| Recording { exact: rows, ..Recording::default() };
         let folder = Path::new("run");
-        let told = reproduce(folder, &mission, &recording(vec![row(0, 0.5)]));
+        let told = reproduce(folder, &mission, &recording(vec![row(0, 0.5)]), None);
         assert_eq!(told, ["mission-control simulate run/mission.toml"]);
-        let told = reproduce(folder, &mission, &recording(vec![row(0, 0.5), row(20, 0.4), row(60, 0.3)]));
+        let told = reproduce(folder, &mission, &recording(vec![row(0, 0.5), row(20, 0.4), row(60, 0.3)]), None);
         let profile =
             "profile = [{ from_s = 0.0, speed = 0.5 }, { from_s = 20.0, speed = 0.4 }, { from_s = 60.0, speed = 0.3 }]";
         assert_eq!(told.last().map(String::as_str), Some(profile));
         let with = text.replace("speed = 0.5", profile);
         assert!(Mission::parse("m", &with).is_ok(), "what is told is a section of a mission");
+    }
+
+    #[test]
+    fn a_run_on_the_clock_is_told_apart_from_its_simulation() {
+        let mission = Mission::parse("m", include_str!("../../missions/auv-helix.toml")).expect("sound");
+        let told = |words: &[&str], speed_up| {
+            let command = words.iter().map(|word| (*word).to_owned()).collect();
+            let host = HostFacts { command, ..HostFacts::now("", speed_up, 1.0, Vec::new(), Vec::new()) };
+            reproduce(Path::new("x"), &mission, &Recording::default(), Some(&host))
+        };
+        let simulate = "mission-control simulate x/mission.toml";
+        let run = told(&["target/mission-control", "run", "my m.toml", "--speed-up", "20", "--out", "x"], Some(20.0));
+        assert!(run[0].contains("without the clock") && run[1] == simulate, "{run:?}");
+        assert!(run[2].contains("another folder behind --out"), "{run:?}");
+        assert_eq!(run[3], "mission-control run 'my m.toml' --speed-up 20 --out x");
+        let stepped = told(&["mission-control", "run", "m.toml", "--stepped"], None);
+        assert!(
+            stepped[0].contains("same numbers") && stepped[3] == "mission-control run m.toml --stepped",
+            "{stepped:?}"
+        );
+        assert_eq!(told(&["mission-control", "simulate", "m.toml"], None), [simulate]);
     }
 
     #[test]

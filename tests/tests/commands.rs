@@ -105,6 +105,50 @@ fn a_terminal_gets_a_bar_and_a_pipe_plain_lines() {
 }
 
 #[test]
+fn the_ending_of_a_flight_begins_with_the_verdict_of_its_report() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &short("200.0"));
+    let mut simulated = ground.control(&["simulate", "mission.toml", "--out", "run"]);
+    simulated.ends_with(0);
+    let said = simulated.stdout();
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines[0].starts_with("auv-helix finished: 200 s"), "{said}");
+    let verdict = lines[1].trim_start();
+    assert!(verdict.starts_with("Coordinated after ") || verdict.starts_with("Not coordinated at the end"), "{said}");
+    let report = fs::read_to_string(ground.path("run/report.html")).expect("a report");
+    let begin = verdict.split(':').next().expect("a begin");
+    assert!(report.contains(&format!("<strong>{begin}</strong>")), "{verdict}");
+    assert!(said.contains("  [covered]") && !said.contains("holds]"), "{said}");
+    for line in said.lines().chain(simulated.stderr().lines()) {
+        assert_eq!(line, line.trim_end());
+    }
+}
+
+#[test]
+fn a_paired_sweep_flies_every_combination_with_the_same_seeds() {
+    let ground = Ground::new();
+    ground.file("mission.toml", &mission_text("tests/missions/loss-delay.toml"));
+    let law = "coordination.law={ switching = { gain = 0.15 } },{ delayed_estimating = { gain = 0.15 } }";
+    let sets = ["--set", law, "--set", "network.loss=0.3,0.5", "--set", "vehicles.v1.start.x_m=2"];
+    ground.controlled(
+        0,
+        &[&["sweep", "mission.toml", "--repeat", "2", "--paired", "--out", "swept"][..], &sets].concat(),
+    );
+    let table = fs::read_to_string(ground.path("swept/runs.csv")).expect("a table");
+    // Three swept keys, the repeat, the seed.
+    let row = |line: &str| line.split(',').skip(3).take(2).map(str::to_owned).collect::<Vec<String>>();
+    let seeds: Vec<(String, String)> =
+        table.lines().skip(1).map(row).map(|row| (row[0].clone(), row[1].clone())).collect();
+    assert_eq!(seeds.len(), 8);
+    for repeat in ["0", "1"] {
+        let of: Vec<&String> = seeds.iter().filter(|(r, _)| r == repeat).map(|(_, seed)| seed).collect();
+        assert!(of.len() == 4 && of.iter().all(|seed| *seed == of[0]), "{seeds:?}");
+    }
+    let picture = fs::read_to_string(ground.path("swept/sweep.svg")).expect("a picture");
+    assert!(picture.contains(">switching<") && picture.contains(">delayed_estimating<"), "{picture}");
+}
+
+#[test]
 fn the_help_of_every_program_has_an_example() {
     for name in ["mission-control", "network-emulator", "vehicle-node"] {
         let output = Command::new(program(name)).arg("--help").output().expect("starts");

@@ -32,6 +32,24 @@ pub fn lines(text: &str) -> Result<Vec<NamedLine>, String> {
     Ok(found)
 }
 
+/// What the geometries of a GeoJSON text are, in order, each kind once: `Point`, `LineString`, ...
+pub fn kinds(text: &str) -> Vec<&'static str> {
+    let geometries: Vec<Geometry> = match text.parse() {
+        Ok(GeoJson::Geometry(geometry)) => vec![geometry],
+        Ok(GeoJson::Feature(feature)) => feature.geometry.into_iter().collect(),
+        Ok(GeoJson::FeatureCollection(all)) => all.features.into_iter().filter_map(|f| f.geometry).collect(),
+        Err(_) => Vec::new(),
+    };
+    let mut kinds: Vec<&str> = Vec::new();
+    for geometry in &geometries {
+        let kind = geometry.value.type_name();
+        if !kinds.contains(&kind) {
+            kinds.push(kind);
+        }
+    }
+    kinds
+}
+
 /// The line of this name, or the only one.
 ///
 /// # Errors
@@ -92,6 +110,12 @@ mod tests {
         assert_eq!(lines.len(), 2);
         assert_eq!((lines[0].name.as_deref(), lines[0].has_heights), (Some("pier"), false));
         assert_eq!((lines[1].places[1].height, lines[1].places[1].latitude), (-5.5, 38.71));
+    }
+
+    #[test]
+    fn the_kinds_of_geometries_are_told() {
+        assert_eq!(kinds(TWO), ["LineString", "Point"]);
+        assert_eq!(kinds("{"), Vec::<&str>::new());
     }
 
     #[test]

@@ -135,6 +135,10 @@ fn tell(
         bus::tell!("{}", serde_json::to_string_pretty(summary).map_err(|error| End(4, error.to_string()))?);
     } else {
         bus::tell!("{} {}: {} s of mission time", mission.name, phase.as_str(), summary.duration_s);
+        for sentence in &summary.headline {
+            bus::tell!("  {sentence}");
+        }
+        bus::tell!("");
         let rows = theory::rows(mission, Some(summary));
         print_theory(&rows);
         for row in rows.iter().filter(|row| row.is_below()) {

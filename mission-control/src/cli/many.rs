@@ -15,14 +15,21 @@ use crate::sweep::plan::Plan;
 use crate::sweep::setting::Setting;
 use crate::sweep::study::Study;
 
-pub(super) fn sweep(path: &Path, sets: &[String], repeat: u32, measure: &str, out: Option<PathBuf>) -> Ended {
+pub(super) fn sweep(
+    path: &Path,
+    sets: &[String],
+    repeat: u32,
+    paired: bool,
+    measure: &str,
+    out: Option<PathBuf>,
+) -> Ended {
     let refused = |reason: String| End(2, reason);
     let mission = load(path)?;
     let out = out.unwrap_or_else(|| PathBuf::from(format!("runs/sweep-{}", mission.name)));
     let settings: Vec<Setting> =
         sets.iter().map(|text| Setting::parse(text)).collect::<Result<_, _>>().map_err(refused)?;
     let measure = index_of(measure).map_err(|reason| End(2, format!("--measure: {reason}")))?;
-    let plan = Plan::new(&path.display().to_string(), mission, settings, repeat).map_err(refused)?;
+    let plan = Plan::new(&path.display().to_string(), mission, settings, repeat).map_err(refused)?.paired(paired);
     let stop = StopFlag::on_signals();
     stop.arm();
     let mut progress = Count::new("sweeping", plan.cells.len() * plan.repeats as usize);

@@ -82,12 +82,13 @@ pub(super) fn warn(mission: &Mission, rows: &[TheoryRow]) {
 
 pub(super) fn print_theory(rows: &[TheoryRow]) {
     for row in rows {
-        let holds = match row.holds {
-            Some(true) => "  [holds]",
-            Some(false) => "  [does not hold]",
+        // Of the premises: whether theory speaks for the mission, not whether what was measured is good.
+        let covered = match row.holds {
+            Some(true) => "  [covered]",
+            Some(false) => "  [not covered]",
             None => "",
         };
-        bus::tell!("  {}{holds}", row.name);
+        bus::tell!("  {}{covered}", row.name);
         let lines = [
             ("needs", &row.condition),
             ("here", &row.value),

@@ -17,6 +17,7 @@ use self::fleet::FleetArgs;
 use self::flight::RunArgs;
 use self::recordings::Format;
 use self::worst::WorstArgs;
+use crate::folder::quoted;
 use crate::waypoints;
 
 /// Flies fleets of vehicles that follow paths in coordination: checks a mission, simulates it, runs it as real processes
@@ -53,7 +54,8 @@ enum What {
         /// Also print the graph: degrees, Laplacian, spanning tree, eigenvalues, all graphs that the network can take
         #[arg(long)]
         graph: bool,
-        /// Also draw what theory gives without a run, as SVG files
+        /// Also draw what theory gives without a run, as SVG files: curves of the mission's law where there are any, and Figure 2.8 of the
+        /// thesis, which is the same for every mission
         #[arg(long, value_name = "DIR")]
         figures: Option<PathBuf>,
     },
@@ -67,7 +69,8 @@ enum What {
         /// The run folder (default: runs/MISSION-TIME)
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Another value for a key of the mission file, such as network.loss=0.3; may be repeated
+        /// Another value for a key of the mission file, such as network.loss=0.3, vehicles.auv2.start.x_m=3 (the same as
+        /// 'vehicles[1].start.x_m=3') or coordination.GAIN for a gain of the mission's law; may be repeated
         #[arg(long = "set", value_name = "KEY=VALUE")]
         sets: Vec<String>,
         /// Another seed
@@ -79,19 +82,26 @@ enum What {
     },
     /// Fly a mission with every combination of some values, each several times, and sum up what came of it
     #[command(
-        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 5\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, or a folder with runs that this sweep would lose,\n  4 files cannot be read or written."
+        after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 6\n\n\
+        Two laws under the same losses:\n  mission-control sweep tests/missions/loss-delay.toml --paired --repeat 6 --set network.loss=0:0.8:0.2 \\\n    \
+        --set 'coordination.law={ switching = { gain = 0.15 } },{ delayed = { gain = 0.15, delay_s = 0.0 } }'\n\n\
+        A key of one vehicle, and of an item of a list:\n  --set vehicles.v1.start.x_m=3,4   --set 'vehicles[0].start.x_m=3,4'\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, or a folder with runs that this sweep would lose,\n  4 files cannot be read or written."
     )]
     Sweep {
         /// The mission file
         mission: PathBuf,
         /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated. For short:
         /// network.loss and network.delay for independent losses and a constant delay in place of the mission's models, and
-        /// coordination.GAIN for a gain of the mission's law
+        /// coordination.GAIN for a gain of the mission's law, vehicles.ID.KEY for vehicles[N].KEY
         #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
         sets: Vec<String>,
-        /// Runs of every combination, each with a seed of its own
+        /// Runs of every combination, each with a seed of its own. The 95 % interval of a median needs six
         #[arg(long, value_name = "TIMES", default_value = "1")]
         repeat: u32,
+        /// The seed of a run follows from the number of the repeat alone: all combinations meet the same random numbers, so that two
+        /// laws, say, are compared under the same losses
+        #[arg(long)]
+        paired: bool,
         /// The number that is drawn; a column of runs.csv
         #[arg(long, value_name = "COLUMN", default_value = "coordination_last")]
         measure: String,
@@ -120,7 +130,8 @@ enum What {
         after_help = "Example:\n  mission-control gallery missions/thesis --out runs/gallery\n\nExit codes: 0 all numbers agree, 1 one disagrees, 2 a wrong mission or gallery file, 4 files cannot be read or written."
     )]
     Gallery {
-        /// The folder: missions, and gallery.toml, which says what figures they make
+        /// The folder: missions, each called as its file, and gallery.toml, which says what figures they make (docs/missions.md,
+        /// "A gallery of your own")
         missions: PathBuf,
         /// Where the page goes
         #[arg(long, value_name = "DIR", default_value = "runs/gallery")]
@@ -220,12 +231,12 @@ enum What {
     Worst(WorstArgs),
     /// Print the lines of a GeoJSON file as paths in metres, to paste into a mission
     #[command(
-        after_help = "Example:\n  mission-control waypoints lanes.geojson --origin=-9.13,38.69\n\nExit codes: 0 printed, 2 no GeoJSON, or no line in it, 4 output cannot be written."
+        after_help = "Example:\n  mission-control waypoints lanes.geojson --origin=-9.13,38.69\n\nExit codes: 0 printed, 2 no GeoJSON, no line in it, or none that makes a path, 4 output cannot be written."
     )]
     Waypoints {
         /// The GeoJSON file
         file: PathBuf,
-        /// Where x, y and z are zero (default: the first position, at the height zero)
+        /// Where x, y and z are zero, the longitude first (default: the first position, at the height zero)
         #[arg(long, value_name = "LON,LAT[,HEIGHT]", value_parser = waypoints::place, allow_hyphen_values = true)]
         origin: Option<Place>,
     },
@@ -267,7 +278,9 @@ fn run(what: What) -> Ended {
         What::Simulate { mission, out, sets, seed, json } => {
             flight::simulate(&mission, out.as_deref(), &sets, seed, json)
         }
-        What::Sweep { mission, sets, repeat, measure, out } => many::sweep(&mission, &sets, repeat, &measure, out),
+        What::Sweep { mission, sets, repeat, paired, measure, out } => {
+            many::sweep(&mission, &sets, repeat, paired, &measure, out)
+        }
         What::Study { study, out } => many::study(&study, out),
         What::Run(args) => flight::run(args),
         What::Gallery { missions, out } => many::gallery(&missions, &out),
@@ -289,12 +302,6 @@ fn run(what: What) -> Ended {
 /// A number, as given on a command line.
 fn number(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "allowed: a number, such as 0.4".to_string())
-}
-
-/// A word of a command as a shell takes it.
-fn quoted(word: String) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
-    if word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
 #[cfg(test)]

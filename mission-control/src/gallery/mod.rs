@@ -20,6 +20,7 @@ mod view;
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -84,7 +85,15 @@ impl Gallery {
             missions.insert(stem, mission);
         }
         let path = folder.join(GALLERY);
-        let text = fs::read_to_string(&path).map_err(|error| unreadable(&path, error))?;
+        let text = fs::read_to_string(&path).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => format!(
+                "{} has no {GALLERY}, which says what figures its missions make; allowed: a folder with one, such as missions/thesis. For \
+                 figures of a changed mission copy that folder, change the mission there and make the gallery of the copy \
+                 (docs/missions.md, \"A gallery of your own\")",
+                folder.display()
+            ),
+            _ => unreadable(&path, error),
+        })?;
         let check =
             |faults: &mut common::mission::Collector<'_>, file: &GalleryFile| check::check(faults, file, &missions);
         let file = read(&path.display().to_string(), &text, check).map_err(|faults| faults.to_string())?;
@@ -285,6 +294,14 @@ expect = [
             let found = fault(old, new);
             assert!(found.lines().any(|line| line.starts_with(expected)), "{found}");
         }
+    }
+
+    #[test]
+    fn a_folder_without_a_gallery_file_is_told_what_one_needs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("fig-1-9.toml"), MISSION).expect("written");
+        let found = Gallery::read(folder.path()).expect_err("refused");
+        assert!(found.contains("has no gallery.toml") && found.contains("such as missions/thesis"), "{found}");
     }
 
     #[test]

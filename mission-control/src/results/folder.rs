@@ -8,6 +8,7 @@ use std::path::Path;
 use bus::recording::Recording;
 use serde::Serialize;
 
+use super::verdict::headline;
 use super::{ClockSummary, Facts, GraphFacts, Report, Summary, TheoryRow, figures, report, summarise, summarise_clock};
 
 /// What the caller has to tell in the report besides numbers.
@@ -49,7 +50,7 @@ pub fn write_run_folder(
     };
     summary.fleet.coordination.hold_against(facts.guaranteed_rate, facts.least_rate);
     let figures = figures(recording, facts);
-    let page = report(&Report {
+    let told = Report {
         facts,
         summary: &summary,
         clock: &clock,
@@ -58,7 +59,8 @@ pub fn write_run_folder(
         notes: &account.notes,
         reproduce: &account.reproduce,
         mission_toml: &recording.mission_toml,
-    });
+    };
+    let (page, headline) = (report(&told), headline(&told));
     let drawings = directory.join("figures");
     fs::create_dir_all(&drawings).map_err(|cause| named(&drawings, &cause))?;
     for figure in &figures {
@@ -69,6 +71,7 @@ pub fn write_run_folder(
     write(&directory.join("theory.json"), &json(&theory)?)?;
     write(&directory.join("clock.json"), &json(&clock)?)?;
     write(&directory.join("report.html"), page.as_bytes())?;
+    summary.headline = headline;
     Ok((summary, clock))
 }
 

@@ -55,6 +55,14 @@ pub(crate) fn escape(text: &str) -> String {
     escaped
 }
 
+/// What a sentence of a page says on a terminal.
+pub(super) fn on_a_terminal(html: &str) -> String {
+    let marks = [("<strong>", ""), ("</strong>", ""), ("·10<sup>−", "e-"), ("·10<sup>", "e"), ("</sup>", "")];
+    // The ampersand last: what it is followed by is text.
+    let characters = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&#39;", "'"), ("&amp;", "&")];
+    marks.iter().chain(&characters).fold(html.to_owned(), |text, (from, to)| text.replace(from, to))
+}
+
 /// What is fit to be told to a person: a text with a number in it that is none says nothing, and none has a hundred digits.
 pub(crate) fn told(text: &str) -> String {
     let is_none = |word: &str| ["NaN", "nan", "inf"].contains(&word);
@@ -114,6 +122,14 @@ mod tests {
         assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(number), ["–"; 3]);
         assert_eq!(told("information from infinity"), "information from infinity");
         assert_eq!(told(&format!("{:.5} 1/s, 0.25 m", -1.5e137)), "-1.500e137 1/s, 0.25 m");
+    }
+
+    #[test]
+    fn a_terminal_has_no_marks() {
+        let html = format!("<strong>Coordinated</strong>: {} &amp; {}", number(5.6e-9), number(-2.5e7));
+        assert_eq!(on_a_terminal(&html), "Coordinated: 5.6e-9 & −2.5e7");
+        let name = "a<b>'&lt;\"";
+        assert_eq!(on_a_terminal(&escape(name)), name);
     }
 
     #[test]

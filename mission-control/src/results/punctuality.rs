@@ -13,6 +13,9 @@ const P99_S: f64 = 1e-3;
 /// Part of the control loops' deadlines that may be missed.
 const MISSED_PART: f64 = 1e-3;
 
+/// What to do about it.
+const REMEDY: &str = "; a lower --speed-up or a quieter machine helps, and --stepped does not depend on the clock";
+
 /// The judgement on a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClockVerdict {
@@ -35,7 +38,8 @@ pub(super) fn verdict(clock: &ClockSummary) -> Option<ClockVerdict> {
         for (name, late, most) in [("p50", deliveries.late_s.median, MEDIAN_S), ("p99", deliveries.late_s.p99, P99_S)] {
             let within = late <= most;
             kept_time &= within;
-            let mut part = format!("{name} {}", duration(late));
+            let of = if parts.is_empty() { "lateness of deliveries " } else { "" };
+            let mut part = format!("{of}{name} {}", duration(late));
             if !within {
                 let _ = write!(part, " > {}", duration(most));
             }
@@ -61,7 +65,8 @@ pub(super) fn verdict(clock: &ClockSummary) -> Option<ClockVerdict> {
         parts.push(format!("{dropped} messages dropped for want of time"));
     }
     let judgement = if kept_time { "the machine kept time" } else { "disturbed by the machine" };
-    Some(ClockVerdict { kept_time, text: format!("{judgement}: {}", parts.join(", ")) })
+    let remedy = if kept_time { "" } else { REMEDY };
+    Some(ClockVerdict { kept_time, text: format!("{judgement}: {}{remedy}", parts.join(", ")) })
 }
 
 fn duration(seconds: f64) -> String {
@@ -90,7 +95,7 @@ mod tests {
     fn each_aim_that_is_missed_is_named() {
         assert_eq!(
             text(&clock(24e-6, 0.2e-3, 1)),
-            (true, "the machine kept time: p50 24 µs, p99 200 µs, never early, 1 of 1000 deadlines missed".into())
+            (true, "the machine kept time: lateness of deliveries p50 24 µs, p99 200 µs, never early, 1 of 1000 deadlines missed".into())
         );
         for (clock, fault) in [
             (clock(0.84e-3, 0.9e-3, 0), "p50 840 µs > 50 µs"),
@@ -99,6 +104,7 @@ mod tests {
         ] {
             let (kept, said) = text(&clock);
             assert!(!kept && said.starts_with("disturbed") && said.contains(fault), "{said}");
+            assert!(said.contains("lateness of deliveries p50") && said.ends_with(REMEDY), "{said}");
         }
     }
 

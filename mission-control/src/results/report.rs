@@ -127,9 +127,9 @@ fn theory(page: &mut String, rows: &[TheoryRow]) {
         return;
     }
     page.push_str("<section>\n<h2>Theory beside measurement</h2>\n");
-    let header = ["statement", "condition", "here", "holds", "guaranteed", "measured"];
+    let header = ["statement", "condition", "here", "covered", "guaranteed", "measured"];
     let rows = rows.iter().map(|row| {
-        let holds = match row.holds {
+        let covered = match row.holds {
             Some(true) => "<span class=\"yes\">yes</span>",
             Some(false) => "<span class=\"no\">no</span>",
             None => "–",
@@ -138,7 +138,7 @@ fn theory(page: &mut String, rows: &[TheoryRow]) {
             [&row.name, &row.condition, &row.value, &row.predicted, &row.measured].map(|text| escape(&told(text)));
         let [name, condition, value, predicted, measured] = text;
         let measured = if row.is_below() { format!("<span class=\"no\">{measured}</span>") } else { measured };
-        vec![name, condition, value, holds.into(), predicted, measured]
+        vec![name, condition, value, covered.into(), predicted, measured]
     });
     table(page, "prose", &header, rows);
     page.push_str("</section>\n");

@@ -39,6 +39,10 @@ pub struct Summary {
     pub links: Vec<LinkSummary>,
     /// What a reader should not overlook.
     pub warnings: Vec<String>,
+    /// The report's verdict in sentences, for a terminal. It speaks of the clock too, so it is not in `summary.json`; it is empty until
+    /// the report is made.
+    #[serde(skip)]
+    pub headline: Vec<String>,
 }
 
 /// The numbers of the fleet.
@@ -149,6 +153,7 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         vehicles,
         links,
         warnings: known,
+        headline: Vec::new(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use network_emulator::hub::ENDED;
 
-use super::html::{escape, number};
+use super::html::{escape, number, on_a_terminal};
 use super::series::is_early;
 use super::vehicle::PATH_THRESHOLD_M;
 use super::{BELOW, Facts, Loss, Report, Summary, TheoryRow};
@@ -12,10 +12,21 @@ const PREDICTED_PART: f64 = 0.1;
 
 /// Whether all is well, and what happened.
 pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
+    let (good, sentences) = sentences(report);
+    (good, sentences.join(" "))
+}
+
+/// The sentences of the verdict as a terminal shows them.
+pub(super) fn headline(report: &Report<'_>) -> Vec<String> {
+    sentences(report).1.iter().map(|sentence| on_a_terminal(sentence)).collect()
+}
+
+/// Whether all is well, and the sentences about it, as HTML.
+fn sentences(report: &Report<'_>) -> (bool, Vec<String>) {
     let Report { facts, summary, .. } = report;
     let flown = summary.vehicles.iter().filter(|vehicle| vehicle.rows > 0).count();
     if flown == 0 {
-        return (false, "Nothing was recorded.".into());
+        return (false, vec!["Nothing was recorded.".into()]);
     }
     let is_whole = summary.complete && summary.fleet.messages.balanced;
     let coordinated = (flown > 1).then(|| of_coordination(summary));
@@ -30,8 +41,8 @@ pub(super) fn verdict(report: &Report<'_>) -> (bool, String) {
         of_rate(report.theory),
     ];
     let parts = || parts.iter().flatten();
-    let sentences: Vec<&str> = parts().map(|(_, sentence)| sentence.as_str()).collect();
-    (is_whole && parts().all(|(good, _)| *good), sentences.join(" "))
+    let sentences = parts().map(|(_, sentence)| sentence.clone()).collect();
+    (is_whole && parts().all(|(good, _)| *good), sentences)
 }
 
 /// That the flight ended before its time, and why.

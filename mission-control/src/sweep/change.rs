@@ -25,8 +25,10 @@ pub fn changed(text: &str, changes: &[(&str, &Value)]) -> Result<String, String>
         let last = steps.pop().unwrap_or(key);
         let mut here = &mut root;
         for (depth, step) in steps.iter().enumerate() {
+            let allowed = list_at(here, step);
             here = below(here, step).ok_or_else(|| {
-                format!("{key}: found nothing at {}; allowed: a key of the mission file", steps[..=depth].join("."))
+                let allowed = allowed.as_deref().unwrap_or("a key of the mission file");
+                format!("{key}: found nothing at {}; allowed: {allowed}", steps[..=depth].join("."))
             })?;
         }
         match index(last) {
@@ -67,6 +69,17 @@ fn below<'t>(table: &'t mut Table, step: &str) -> Option<&'t mut Table> {
         *value = Value::Table(Table::new());
     }
     value.as_table_mut()
+}
+
+/// How the items of the list at `name` or `name[9]` are written, if there is one.
+fn list_at(table: &Table, step: &str) -> Option<String> {
+    let name = index(step).map_or(step, |(name, _)| name);
+    let items = table.get(name)?.as_array()?;
+    let last = items.len().checked_sub(1)?;
+    // Of vehicles, which have names, the names too.
+    let id = items.iter().find_map(|item| item.get("id")?.as_str());
+    let named = id.map_or(String::new(), |id| format!(", or the id: {name}.{id}.KEY"));
+    Some(format!("an item of the list, '{name}[0].KEY' to '{name}[{last}].KEY' (in quotes for the shell){named}"))
 }
 
 /// `name[3]` as its parts.
@@ -139,7 +152,12 @@ mod tests {
                 Value::from(1.0),
                 "coordination.law: found introduction, switching; allowed: one of",
             ),
-            ("vehicles[7].id", Value::from("x"), "vehicles[7].id: found nothing at vehicles[7]"),
+            (
+                "vehicles[7].id",
+                Value::from("x"),
+                "vehicles[7].id: found nothing at vehicles[7]; allowed: an item of the list, 'vehicles[0].KEY' to 'vehicles[1].KEY'",
+            ),
+            ("vehicles.0.start.x_m", Value::from(3), "or the id: vehicles.v1.KEY"),
             ("duration_s.x", Value::from(1), "duration_s.x: found nothing at duration_s"),
             ("duration_s", Value::from("long"), "duration_s: found a string; allowed: "),
             ("network.links[9]", Value::from(1), "network.links[9]: found no such item"),

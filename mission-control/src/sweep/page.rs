@@ -68,10 +68,18 @@ pub(super) fn table(page: &mut String, plan: &Plan, swept: &Swept, measure: usiz
 /// How the sweep is made again, and each run of it.
 pub(super) fn how(page: &mut String, plan: &Plan, command: &str) {
     let runs = plan.cells.len() * plan.repeats as usize;
+    let seeds = match plan.paired {
+        false => {
+            "The seed of a run follows from the mission's seed, the values of its cell and the number of the repeat"
+        }
+        true => {
+            "The runs are paired: the seed of a run follows from the mission's seed and the number of the repeat alone, so that all cells \
+             meet the same random numbers"
+        }
+    };
     let _ = write!(
         page,
-        "{runs} runs, {} of each cell; made by\n\n```sh\n{command}\n```\n\nThe seed of a run follows from the mission's seed, the \
-         values of its cell and the number of the repeat; it is in runs.csv. The command that flies the first run of a cell again is \
+        "{runs} runs, {} of each cell; made by\n\n```sh\n{command}\n```\n\n{seeds}; it is in runs.csv. The command that flies the first run of a cell again is \
          in cells.csv, in the column {REPLAY}; with another `--seed` from runs.csv it flies another run of that cell. Of the last \
          cell it is\n\n```sh\n{}\n```\n",
         plan.repeats,

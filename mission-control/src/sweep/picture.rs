@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use kuva::plot::{ColorMap, Heatmap, LinePlot, ScatterPlot};
 use kuva::render::layout::{Layout, TickFormat};
-use toml::Value;
 
 use super::cells::{CellStatistics, Spread};
 use super::measure::MEASURES;
 use super::page::to_digits;
 use super::parquet::number;
 use super::plan::Plan;
-use super::setting::{Setting, shown};
+use super::setting::{Setting, labels};
 use crate::results::drawing::{Drawing, PLANNED, Panel, colour, render};
 
 /// From this ratio of the largest to the smallest value on, an axis or a scale of colours is logarithmic.
@@ -36,8 +35,8 @@ pub fn picture(plan: &Plan, cells: &[CellStatistics], measure: usize, name: &str
         [first, down, across] if first.values.len() <= MOST_MAPS => {
             let scale = Scale::of(cells, measure)?;
             let each = cells.chunks(down.values.len() * across.values.len());
-            let maps = first.values.iter().zip(each).map(|(value, cells)| {
-                heat_map(cells, measure, [down, across], scale, &title(measure, Some((&first.key, value))))
+            let maps = labels(&first.values).into_iter().zip(each).map(|(value, cells)| {
+                heat_map(cells, measure, [down, across], scale, &title(measure, Some((&first.key, &value))))
             });
             let maps: Vec<Drawing> = maps.collect();
             let columns = maps.len().min(MAPS_IN_A_ROW);
@@ -47,11 +46,11 @@ pub fn picture(plan: &Plan, cells: &[CellStatistics], measure: usize, name: &str
     }
 }
 
-fn title(measure: usize, of: Option<(&str, &Value)>) -> String {
+fn title(measure: usize, of: Option<(&str, &str)>) -> String {
     match of {
         // The whole path would not fit above a map.
         Some((key, value)) => {
-            format!("{}, {} = {}", about(measure), key.rsplit('.').next().unwrap_or(key), shown(value))
+            format!("{}, {} = {value}", about(measure), key.rsplit('.').next().unwrap_or(key))
         }
         None => about(measure).into(),
     }
@@ -161,7 +160,6 @@ fn heat_map(
     let data: Vec<Vec<f64>> = cells.chunks(columns).map(|row| row.iter().map(place).collect()).collect();
     let values = || data.iter().flatten().copied();
     let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    let names = |setting: &Setting| setting.values.iter().map(shown).collect::<Vec<String>>();
     let mut panel = Panel::default();
     let missing: Vec<(usize, usize)> = data
         .iter()
@@ -177,8 +175,8 @@ fn heat_map(
     }
     let mut layout = panel
         .layout(title, &across.key, &down.key)
-        .with_x_categories(names(across))
-        .with_y_categories(names(down))
+        .with_x_categories(labels(&across.values))
+        .with_y_categories(labels(&down.values))
         .with_colorbar_tick_format(TickFormat::Custom(Arc::new(move |place| {
             to_digits(if scale.log { 10_f64.powf(place) } else { place }, 3)
         })));

@@ -6,7 +6,7 @@ use common::mission::{Fault, Mission, digest};
 use toml::Value;
 
 use super::change::{changed, chosen};
-use super::setting::{Setting, option, shown};
+use super::setting::{Setting, option, short_gains, shown};
 
 /// Most runs of a sweep.
 const MOST_RUNS: usize = 1_000_000;
@@ -33,6 +33,8 @@ pub struct Plan {
     pub repeats: u32,
     /// Every combination of values; the last key changes fastest.
     pub cells: Vec<Cell>,
+    /// Whether the seed follows from the repeat alone, so that every cell meets the same random numbers.
+    pub paired: bool,
 }
 
 impl Plan {
@@ -69,12 +71,21 @@ impl Plan {
             Ok(Cell { values, text })
         };
         let cells = combinations.into_iter().map(cell).collect::<Result<Vec<Cell>, String>>()?;
-        Ok(Plan { file: file.to_string(), mission, settings, repeats, cells })
+        Ok(Plan { file: file.to_string(), mission, settings, repeats, cells, paired: false })
+    }
+
+    /// The plan with seeds that are the same in all cells, or not: to compare cells, such as two laws, under the same losses.
+    pub fn paired(self, paired: bool) -> Plan {
+        Plan { paired, ..self }
     }
 
     /// The seed of a run, from the mission's seed, the values of the cell and the number of the repeat: the first 53 bits of
-    /// a SHA-256. It depends on nothing else, so a sweep that is enlarged keeps the runs that it has.
+    /// a SHA-256. It depends on nothing else, so a sweep that is enlarged keeps the runs that it has. In a paired plan the values
+    /// have no part in it.
     pub fn seed(&self, cell: usize, repeat: u32) -> u64 {
+        if self.paired {
+            return digest(&format!("{} paired {repeat}", self.mission.seed)) >> 11;
+        }
         let values: Vec<String> = self
             .settings
             .iter()
@@ -112,7 +123,8 @@ pub fn apply(text: &str, changes: &[(&str, &Value)]) -> Result<String, String> {
         format!("with {}: {reason}", options.join(" "))
     };
     let after = changed(text, changes).map_err(of_cell)?;
-    parse(&after, |fault| second_model(text, changes, fault)).map_err(of_cell)?;
+    let known = |fault: &Fault| second_model(text, changes, fault).or_else(|| short_form(text, changes, fault));
+    parse(&after, known).map_err(of_cell)?;
     Ok(after)
 }
 
@@ -139,6 +151,26 @@ fn second_model(text: &str, changes: &[(&str, &Value)], fault: &Fault) -> Option
         "{place}: found {there} in the mission, so there is no {model} with keys to set; allowed: keys of {place}.{there}, or \
          another model as a whole, with all keys that it needs, say --set '{whole}'"
     ))
+}
+
+/// What is wrong with a key for which a short form would do, with that form among what is allowed.
+fn short_form(text: &str, changes: &[(&str, &Value)], fault: &Fault) -> Option<String> {
+    changes.iter().find(|(key, _)| *key == fault.key)?;
+    let short = match fault.key.as_str() {
+        "network.loss" => {
+            "a number, the probability with which each message is lost (in a sweep also FROM:TO:STEP)".into()
+        }
+        "network.delay" => "a number, the same delay for all messages (s) (in a sweep also FROM:TO:STEP)".into(),
+        key if key.strip_prefix("coordination.").is_some_and(|name| !name.contains('.')) => {
+            let gains = short_gains(text);
+            if gains.is_empty() || !fault.found.contains("unknown key") {
+                return None;
+            }
+            format!("for short {}", gains.join(", "))
+        }
+        _ => return None,
+    };
+    Some(format!("{fault}; {short}"))
 }
 
 #[cfg(test)]
@@ -176,6 +208,17 @@ mod tests {
     }
 
     #[test]
+    fn in_a_paired_plan_every_cell_has_the_same_seeds() {
+        let small = plan(&["network.loss=0,0.5"], 2).expect("sound").paired(true);
+        let large = plan(&["network.loss=0,0.25,0.5", "duration_s=5,6"], 5).expect("sound").paired(true);
+        for repeat in 0..2 {
+            assert!((0..6).all(|cell| large.seed(cell, repeat) == small.seed(0, repeat)));
+        }
+        assert_ne!(small.seed(0, 0), small.seed(0, 1));
+        assert_ne!(small.seed(0, 0), small.clone().paired(false).seed(0, 0));
+    }
+
+    #[test]
     fn a_run_is_replayed_by_a_command_with_its_values_and_seed() {
         let plan = plan(&["network.loss=0.5"], 1).expect("sound");
         let seed = plan.seed(0, 0);
@@ -198,6 +241,9 @@ mod tests {
                  switching with keys to set; allowed: keys of coordination.law.introduction, or another model as a whole, with all \
                  keys that it needs, say --set 'coordination.law={ switching.gain = 1 }'",
             ),
+            (&["coordination.gian=1"][..], "; for short coordination.gain"),
+            (&["network.loss=abc"][..], "; a number, the probability with which each message is lost"),
+            (&["network.delay=0:1"][..], "; a number, the same delay for all messages (s)"),
             (&["duration_s=1", "duration_s=2"][..], "--set duration_s: found twice"),
             (&["seed=1,2"][..], "--set seed: found in a sweep; allowed: other keys"),
             (&["duration_s=1:10000:1", "network.loss=0:0.999:0.001"][..], "found 10000000 runs"),

@@ -47,11 +47,35 @@ impl Setting {
     }
 
     /// The setting for a mission: a gain may be named without the mission's law, `coordination.gain` for
-    /// `coordination.law.switching.gain`.
+    /// `coordination.law.switching.gain`, and a vehicle by its name, `vehicles.auv2.start.x_m` for `vehicles[1].start.x_m`.
     pub fn of(self, mission: &str) -> Setting {
-        let key = self.key.strip_prefix("coordination.").and_then(|gain| gain_of_law(mission, gain));
+        let gain = self.key.strip_prefix("coordination.").and_then(|gain| gain_of_law(mission, gain));
+        let key = gain.or_else(|| self.key.strip_prefix("vehicles.").and_then(|rest| key_of_vehicle(mission, rest)));
         Setting { key: key.unwrap_or(self.key), ..self }
     }
+}
+
+/// The whole key of what is named as `ID.KEY`. A name has no dot, and no two vehicles have the same.
+fn key_of_vehicle(mission: &str, rest: &str) -> Option<String> {
+    let (id, key) = rest.split_once('.')?;
+    let root: toml::Table = mission.parse().ok()?;
+    let place = root
+        .get("vehicles")?
+        .as_array()?
+        .iter()
+        .position(|vehicle| vehicle.get("id").and_then(Value::as_str) == Some(id))?;
+    Some(format!("vehicles[{place}].{key}"))
+}
+
+/// The gains of the mission's law as they may be named for short.
+pub(super) fn short_gains(mission: &str) -> Vec<String> {
+    let gains = || {
+        let root: toml::Table = mission.parse().ok()?;
+        let law = root.get("coordination")?.get("law")?.as_table()?.values().next()?;
+        let numbers = law.as_table()?.keys().filter(|gain| gain_of_law(mission, gain).is_some());
+        Some(numbers.map(|gain| format!("coordination.{gain}")).collect())
+    };
+    gains().unwrap_or_default()
 }
 
 /// The whole key of a gain that the mission's law has.
@@ -141,6 +165,18 @@ pub fn shown(value: &Value) -> String {
     }
 }
 
+/// The values as the labels of an axis: of a choice with keys, such as a law, its name, if no two of them have the same.
+pub fn labels(values: &[Value]) -> Vec<String> {
+    let named = |value: &Value| match value.as_table() {
+        Some(table) if table.len() == 1 => table.keys().next().cloned(),
+        _ => None,
+    };
+    let label = |value: &Value| named(value).unwrap_or_else(|| shown(value));
+    let known: HashSet<String> = values.iter().map(label).collect();
+    let distinct = known.len() == values.len();
+    values.iter().map(|value| if distinct { label(value) } else { shown(value) }).collect()
+}
+
 /// `--set` that gives a key one value, ready for a shell.
 pub fn option(key: &str, value: &Value) -> String {
     let text = format!("{key}={}", shown(value));
@@ -190,6 +226,18 @@ mod tests {
     }
 
     #[test]
+    fn a_vehicle_may_be_named() {
+        let mission = "[[vehicles]]\nid = \"north\"\n[[vehicles]]\nid = \"0\"\n";
+        let of = |key: &str| Setting::parse(&format!("{key}=1")).expect("one").of(mission).key;
+        assert_eq!(of("vehicles.north.start.x_m"), "vehicles[0].start.x_m");
+        // A name goes before a place, and a place is written in brackets.
+        assert_eq!(of("vehicles.0.pattern"), "vehicles[1].pattern");
+        for whole in ["vehicles[1].pattern", "vehicles.south.pattern", "vehicles.north"] {
+            assert_eq!(of(whole), whole);
+        }
+    }
+
+    #[test]
     fn what_cannot_be_read_is_refused_with_the_reason() {
         for (text, reason) in [
             ("network.loss", "no ="),
@@ -206,6 +254,15 @@ mod tests {
             let found = Setting::parse(text).expect_err(text);
             assert!(found.contains(reason) && found.contains("allowed: "), "{found}");
         }
+    }
+
+    #[test]
+    fn a_choice_is_labelled_with_its_name_where_that_tells_it_from_the_others() {
+        let labels = |text: &str| labels(&Setting::parse(text).expect("one").values);
+        assert_eq!(labels("a={ x = { gain = 1 } },{ y = {} },none"), ["x", "y", "none"]);
+        assert_eq!(labels("a=0.5,1"), ["0.5", "1"]);
+        let twice = labels("a={ x = { gain = 1 } },{ x = { gain = 2 } }");
+        assert!(twice[0] != twice[1] && twice[0].contains("gain = 1"), "{twice:?}");
     }
 
     #[test]

@@ -41,6 +41,9 @@ pub struct SweepSection {
     /// Runs of each cell.
     #[serde(default = "one")]
     pub repeat: u32,
+    /// Whether every cell meets the same random numbers, as `sweep --paired`.
+    #[serde(default)]
+    pub paired: bool,
 }
 
 fn one() -> u32 {
@@ -63,12 +66,21 @@ impl Study {
     /// What cannot be read or flown, and why.
     pub fn read(path: &Path) -> Result<Study, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+        let is_mission = |table: toml::Table| table.contains_key("vehicles") && !table.contains_key("sweeps");
+        if text.parse().is_ok_and(is_mission) {
+            return Err(format!(
+                "{}: found a mission file; allowed: a study file, such as missions/studies/loss-delay.toml, which names its mission. To fly a \
+                 mission with many values: mission-control sweep",
+                path.display()
+            ));
+        }
         let file: StudyFile = read(&path.display().to_string(), &text, check).map_err(|faults| faults.to_string())?;
         let beside = path.parent().unwrap_or(Path::new("."));
         let plan = |section: &SweepSection| {
             let mission = beside.join(&section.mission);
             let settings = section.set.iter().map(|text| Setting::parse(text)).collect::<Result<_, _>>()?;
             Plan::new(&mission.display().to_string(), load(&mission)?, settings, section.repeat)
+                .map(|plan| plan.paired(section.paired))
                 .map_err(|reason| format!("{}: {reason}", section.id))
         };
         let plans = file.sweeps.iter().map(plan).collect::<Result<_, String>>()?;
@@ -174,6 +186,13 @@ mod tests {
             }
         }
         assert!(count > 0);
+    }
+
+    #[test]
+    fn a_mission_file_is_told_to_be_one() {
+        let mission = Path::new(env!("CARGO_MANIFEST_DIR")).join("../missions/auv-helix.toml");
+        let found = Study::read(&mission).expect_err("no study");
+        assert!(found.contains("found a mission file; allowed: a study file") && found.lines().count() == 1, "{found}");
     }
 
     #[test]

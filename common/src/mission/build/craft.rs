@@ -233,6 +233,14 @@ fn limited(auv: Auv, limits: &Limits) -> Result<Auv, String> {
 
 /// The largest |p'| over the range in which a path is used.
 pub(in crate::mission) fn largest_stretch(path: &dyn Path) -> f64 {
+    stretched_most(path).1
+}
+
+/// Where |p'| of a path is largest, and how large it is there.
+pub(in crate::mission) fn stretched_most(path: &dyn Path) -> (f64, f64) {
     let (from, to) = path.search_range();
-    (0..=1000).map(|i| path.at(from + (to - from) * f64::from(i) / 1000.0).r()).fold(0.0, f64::max)
+    (0..=1000)
+        .map(|i| from + (to - from) * f64::from(i) / 1000.0)
+        .map(|xi| (xi, path.at(xi).r()))
+        .fold((from, 0.0), |most, here| if here.1 > most.1 { here } else { most })
 }

@@ -5,6 +5,6 @@ mod craft;
 mod law;
 mod path;
 
-pub(super) use craft::{auv, auv_gains, auv_state, craft, largest_stretch};
+pub(super) use craft::{auv, auv_gains, auv_state, craft, largest_stretch, stretched_most};
 pub(super) use law::{diagonal, gains_by_vehicle, law, law_name, nominal_factor, told};
 pub(super) use path::path;

@@ -251,6 +251,25 @@ mod tests {
     }
 
     #[test]
+    fn a_delta_too_small_is_told_with_its_key_its_vehicle_and_both_ways_out() {
+        let found = faults_with("speed = 0.5", "speed = 5.0");
+        let fault = found.iter().find(|fault| fault.contains("auv1")).unwrap_or_else(|| panic!("{found:?}"));
+        for part in
+            ["fleet.following.theorem47.delta1_mps: found -0.3 m/s for auv1", "v_L = 5 /s", "delta1_mps below -0."]
+        {
+            assert!(fault.contains(part), "{fault}");
+        }
+        // What is proposed is allowed.
+        let after =
+            |text: &str| fault.split(text).nth(1).and_then(|rest| rest.split([',', ' ']).next()).expect("there");
+        let slower = format!("speed = {}", after("formation speed below "));
+        assert_eq!(faults_with("speed = 0.5", &slower), Vec::<String>::new());
+        let more = format!("kind = \"II\", delta1_mps = {}1", after("delta1_mps below "));
+        let faster = HELIX.replacen("speed = 0.5", "speed = 5.0", 1).replacen("kind = \"II\"", &more, 1);
+        assert_eq!(faults(&faster), Vec::<String>::new());
+    }
+
+    #[test]
     fn event_triggers_that_make_no_sense_are_refused() {
         let text = include_str!("../../../../missions/talk/event-triggered.toml");
         for (old, new, key) in [

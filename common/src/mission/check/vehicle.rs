@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::super::fault::Collector;
+use super::super::fault::{Collector, plain};
 use super::super::file::{
     FollowingChoice, FollowingType, LawChoice, MissionFile, ModelChoice, PathChoice, SegmentChoice, VehicleSection,
 };
@@ -11,6 +11,7 @@ use super::environment::{LARGEST, check_disturbances, check_limits};
 use super::path::check_path;
 use super::{FARTHEST, LARGEST_ANGLE, LARGEST_XI};
 use crate::coordination::{DemandKind, FleetLaw};
+use crate::following::theorem_4_7::Gains;
 use crate::path::Path;
 use crate::path::closest::closest_parameter;
 
@@ -69,11 +70,51 @@ pub(super) fn check_vehicle(
     let xi = start.xi.or_else(|| usable.then(|| closest_parameter(path.as_ref(), position, true)))?;
     let start = Start { position: position.into(), yaw: start.yaw_deg.to_radians(), speed: start.speed_mps, xi };
     let plan = VehiclePlan { id: section.id.clone(), pattern, path, start, model, following, limits, disturbances };
+    if !check_delta1(faults, &following_key(&key, section), &plan, factor, fastest) {
+        return None;
+    }
     if let Err(reason) = build::craft(&plan, start, factor, fastest, law.map_or(DemandKind::Rate, |law| law.kind())) {
         faults.fault(&following_key(&key, section), reason, "");
         return None;
     }
     Some(plan)
+}
+
+/// Whether δ_1 of Theorem 4.7 is large enough for the fastest motion along the path (erratum 4.11). Says which vehicle it is, and both
+/// ways out: another δ_1, or a slower formation.
+fn check_delta1(
+    faults: &mut Collector<'_>,
+    following_key: &str,
+    plan: &VehiclePlan,
+    factor: f64,
+    fastest: f64,
+) -> bool {
+    let (ModelChoice::UnderactuatedAuv(model), FollowingChoice::Theorem47(gains)) = (&plan.model, &plan.following)
+    else {
+        return true;
+    };
+    // What is wrong with the vehicle itself, or with the sign, is told where it is built.
+    let Ok(auv) = build::auv(model) else { return true };
+    let (xi, stretch) = build::stretched_most(plan.path.as_ref());
+    let least = Gains::smallest_delta1(&auv, fastest * factor, stretch);
+    if !least.is_finite() || gains.delta1_mps >= 0.0 || gains.delta1_mps.abs() > least {
+        return true;
+    }
+    // Rounded outwards, so that what is proposed is allowed.
+    let below = (least * 1e3).ceil() / 1e3;
+    let slower = (fastest * gains.delta1_mps.abs() / least * 1e3).floor() / 1e3;
+    let found = format!(
+        "{} m/s for {}, too little at v_L = {} /s where |p'| of its path is {stretch:.3} m (xi = {xi:.1}): thrust and turning rates \
+         could become unbounded",
+        plain(gains.delta1_mps),
+        plan.id,
+        plain(fastest)
+    );
+    let allowed = format!(
+        "delta1_mps below -{below:.3}, which is v_n |p'| (max m_ii - m_11)/m_11, or a formation speed below {slower:.3} /s"
+    );
+    faults.fault(&format!("{following_key}.theorem47.delta1_mps"), found, allowed);
+    false
 }
 
 /// The vehicle's place in the pattern.

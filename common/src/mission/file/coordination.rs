@@ -117,7 +117,7 @@ pub enum LawChoice {
     Auxiliary(Auxiliary),
     /// Auxiliary state, switching network, (4.62).
     AuxiliarySwitching(Auxiliary),
-    /// As the one before, by vehicles that are not told the delay: they estimate v_L*.
+    /// As delayed_with_losses, (4.42), by vehicles that are not told the delay: they estimate v_L*.
     DelayedEstimating(DelayedEstimating),
     /// Delayed information compared with one's own past of the same age.
     KnownDelay(KnownDelay),
