@@ -87,6 +87,12 @@ impl Processes {
             .map_err(failed)
     }
 
+    /// A single process under this name.
+    #[cfg(test)]
+    pub(crate) fn of(name: &str, child: Child) -> Processes {
+        Processes { running: BTreeMap::from([(name.to_string(), child)]), ended: Vec::new() }
+    }
+
     /// Whether this process is there; one that has ended is not started again.
     pub(crate) fn is_running(&self, name: &str) -> bool {
         self.running.contains_key(name)
