@@ -6,7 +6,7 @@ use common::record::{Record, Row, SpeedRow};
 use common::time::Time;
 use common::wire::vehicle::{ClockPlan, Phase, SpeedCommand, ToVehicle};
 
-use super::{ASLEEP_S, Hub, HubOutput, LATEST_BEGIN_S};
+use super::{ASLEEP, ASLEEP_S, Hub, HubOutput, LATEST_BEGIN_S};
 use crate::emulator::{Channel, Emulator, Sent};
 use crate::lockstep::Lockstep;
 
@@ -80,14 +80,15 @@ impl Hub {
         let Some((load, speed_up)) = self.load.as_mut().and_then(|load| load.speed_up().map(|s| (load, s))) else {
             return;
         };
-        let before = std::mem::replace(&mut load.awake, load.awake.max(now));
+        let before = load.awake;
+        load.awake = before.max(now);
         let (gone, back) = (before.max(Time::ZERO), now.min(load.mission.end));
         if (now - before).secs() <= ASLEEP_S * speed_up || back <= gone {
             return;
         }
         load.emulator.slept(gone, back);
         self.drain_emulator();
-        let text = format!("the emulator was not let run from {gone} to {back}; every link was down meanwhile");
+        let text = format!("{ASLEEP} from {gone} to {back}; every link was down meanwhile");
         self.note(back, &text);
         self.say(text);
     }

@@ -31,6 +31,9 @@ pub const HUB: &str = "network-emulator";
 /// The note with which a flight ends before its time begins with this; what follows is why.
 pub const ENDED: &str = "flight ended: ";
 
+/// The note about a time in which the emulator carried nothing although it was there begins with this.
+pub const ASLEEP: &str = "the emulator was not let run";
+
 /// A speed commanded now holds from this much later, so that every vehicle has it in time \[s of wall clock\].
 const SPEED_LEAD_S: f64 = 0.25;
 
