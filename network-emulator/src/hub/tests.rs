@@ -139,6 +139,21 @@ fn a_stepped_run_needs_every_vehicle() {
     assert!(told(&outputs(&mut hub), "auv2").contains(&&ToVehicle::Stop));
 }
 
+/// Its last word never came, for it had no line. That is no reason to say that it gave none.
+#[test]
+fn who_lost_the_line_in_a_stepped_run_comes_back_with_the_reason() {
+    let mut hub = flying(Pace::Stepped, ClockPlan::Stepped);
+    IDS.iter().for_each(|id| hub.handle(Time::ZERO, Some(HubInput::Left((*id).into()))));
+    let flight = FlightPlan { mission: HELIX.into(), clock: ClockPlan::Stepped, speeds: vec![] };
+    join(&mut hub, "auv2", Phase::Aborted, Some(flight));
+    let answers = ask(&mut hub, Time::ZERO, ToFleet::Status);
+    let reason = answers.iter().find_map(|output| match output {
+        HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some(status.vehicles[1].reason.as_str()),
+        _ => None,
+    });
+    assert_eq!(reason, Some("it lost the line to the network-emulator in a stepped run"));
+}
+
 #[test]
 fn a_real_flight_goes_on_without_one() {
     let mut hub = flying(Pace::Real { speed_up: 1.0 }, epoch());
