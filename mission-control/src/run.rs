@@ -123,7 +123,11 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
         processes.terminate();
         processes.end();
         folder.iter().for_each(|folder| discard(folder));
-        if plan.is_own() && stop.is_raised() { Failure::Refused(INTERRUPTED.to_string()) } else { failure }
+        match failure {
+            _ if plan.is_own() && stop.is_raised() => Failure::Refused(INTERRUPTED.to_string()),
+            Failure::Unreachable(why) => processes.failure(why),
+            failure => failure,
+        }
     })?;
     // Of an own fleet it is armed already, and may have been raised meanwhile.
     if !plan.is_own() {
@@ -202,7 +206,7 @@ fn in_vain(processes: &mut Processes, interrupted: bool) -> Option<String> {
 
 /// What is told of own processes that ended before the flight.
 fn ended_early(processes: &Processes) -> String {
-    format!("{} before the flight; see its log in logs/", processes.ended().join(", "))
+    format!("{} before the flight; see its log in logs/, if it has one", processes.ended().join(", "))
 }
 
 /// Conducts the flight to its end; gives the line back.
@@ -493,7 +497,7 @@ impl Port for ConductPort<'_> {
             return Next::Feed(ConductInput::Interrupt);
         }
         if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended().is_empty() {
-            return Next::Exit(Err(Failure::Unreachable(ended_early(self.processes))));
+            return Next::Exit(Err(self.processes.failure(ended_early(self.processes))));
         }
         if self.own && !self.processes.has_hub() {
             // Nobody will start it again; what was recorded is worth a report.
@@ -536,6 +540,19 @@ mod tests {
             }
         };
         assert!(why.contains("SIGKILL") && why.contains("before the flight"), "{why}");
+        assert!(matches!(killed.failure(why), Failure::Unreachable(_)));
+    }
+
+    #[test]
+    fn a_fleet_that_can_keep_no_logs_is_a_matter_of_files() {
+        let child = Command::new("sh").args(["-c", "exit 4"]).spawn().expect("starts");
+        let mut processes = Processes::of("auv1", child);
+        let begun = Instant::now();
+        while processes.look().is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(20), "it is noticed");
+        }
+        let failure = processes.failure(ended_early(&processes));
+        assert!(matches!(&failure, Failure::Files(why) if why.contains("is the disk full?")), "{failure:?}");
     }
 
     fn status(phase: Phase, now_s: f64) -> FleetStatus {
