@@ -28,7 +28,7 @@ pub(super) struct WorstArgs {
     #[arg(long, value_enum, default_value = "end")]
     hurt: Hurt,
     /// How many flights the search may take
-    #[arg(long, default_value = "400")]
+    #[arg(long, default_value = "400", value_parser = at_least_one)]
     flights: usize,
     /// Seed of the search
     #[arg(long, default_value = "1")]
@@ -39,6 +39,10 @@ pub(super) struct WorstArgs {
     /// JSON for a pipe
     #[arg(long)]
     json: bool,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|flights| *flights > 0).ok_or_else(|| "allowed: a whole number from 1".to_string())
 }
 
 pub(super) fn worst(args: &WorstArgs) -> Ended {

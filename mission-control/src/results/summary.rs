@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use bus::recording::Recording;
-use common::record::Record;
+use common::record::{ClockRecord, Record};
+use network_emulator::hub::ASLEEP;
 use serde::Serialize;
 
 use super::Facts;
@@ -222,6 +223,12 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
         let periods = if row.count == 1 { "period" } else { "periods" };
         warnings.push(format!("{}: {}, in {} control {periods}.", row.source, row.text, row.count));
     }
+    // What the network was not: the numbers are of a fleet that nobody meant.
+    let asleep = recording.clock.iter().filter_map(|record| match record {
+        ClockRecord::Note(row) if row.text.starts_with(ASLEEP) => Some(format!("{}.", row.text)),
+        _ => None,
+    });
+    warnings.extend(asleep);
     warnings
 }
 
@@ -277,6 +284,15 @@ mod tests {
         let expected =
             ["1 control period.", "40 control periods."].map(|n| format!("v2: an actuator was at its limit, in {n}"));
         assert_eq!(warnings, expected);
+    }
+
+    #[test]
+    fn a_network_that_was_not_there_is_warned_of() {
+        let mut recording = fleet(false);
+        let text = format!("{ASLEEP} from 5.000 s to 38.000 s; every link was down meanwhile");
+        let row = NoteRow { t_ns: 9, source: "network-emulator".into(), text: text.clone(), count: 1 };
+        recording.clock.push(ClockRecord::Note(row));
+        assert_eq!(summarise(&recording, &facts(false)).warnings, [text + "."]);
     }
 
     #[test]
