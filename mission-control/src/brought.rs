@@ -311,7 +311,9 @@ mod tests {
             ground.log(&format!("lg/{id}.mcap"), id, 0..31, START);
         }
         // The network had two lives.
-        ["lg/network-emulator.mcap", "lg/network-emulator-2.mcap"].map(|path| ground.network(path, START));
+        for path in ["lg/network-emulator.mcap", "lg/network-emulator-2.mcap"] {
+            ground.network(path, START);
+        }
         // Of an earlier flight, in which it was not.
         ground.log("lg/auv3-2.mcap", "auv3", 40..50, START.map(|start| start - 1));
         let notes = add(&ground.run, &ground.place("lg")).expect("adds");

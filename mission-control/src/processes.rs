@@ -97,7 +97,9 @@ impl Processes {
     /// A single process under this name.
     #[cfg(test)]
     pub(crate) fn of(name: &str, child: Child) -> Processes {
-        Processes { running: BTreeMap::from([(name.to_string(), child)]), ..Processes::default() }
+        let mut one = Processes::default();
+        one.running.insert(name.to_string(), child);
+        one
     }
 
     /// Whether this process is there; one that has ended is not started again.
