@@ -332,7 +332,7 @@ fn not_armed(mission: &Mission, status: &FleetStatus) -> String {
 /// Since when messages are counted, if not from the start.
 fn counted_since(status: &FleetStatus) -> String {
     let from = status.counted_from;
-    if from > Time::ZERO { format!(" since {:.0} s", from.secs()) } else { String::new() }
+    if from > Time::ZERO { format!(" since {:.0} s:", from.secs()) } else { String::new() }
 }
 
 /// What is told to who joins a flight under way and asked for this.
