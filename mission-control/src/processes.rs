@@ -97,7 +97,9 @@ impl Processes {
     /// A single process under this name.
     #[cfg(test)]
     pub(crate) fn of(name: &str, child: Child) -> Processes {
-        Processes { running: BTreeMap::from([(name.to_string(), child)]), ..Processes::default() }
+        let mut processes = Processes::default();
+        processes.running.insert(name.to_string(), child);
+        processes
     }
 
     /// Whether this process is there; one that has ended is not started again.
