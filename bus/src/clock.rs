@@ -70,6 +70,12 @@ impl RealClock {
     }
 }
 
+/// The system's clock \[ns of the UNIX epoch\].
+pub(crate) fn unix_ns() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
 /// How much later than `due` this moment is \[ns\]; negative if it is earlier.
 pub fn late_ns(at: Instant, due: Instant) -> i64 {
     let nanos = |length: Duration| i64::try_from(length.as_nanos()).unwrap_or(i64::MAX);

@@ -6,7 +6,7 @@
 
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -16,10 +16,11 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::sample::SampleKind;
 use zenoh::{Session, Wait};
 
+use crate::clock::unix_ns;
 use crate::counts::{Counts, Tally};
 use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
-use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id};
+use crate::lobby::{Admission, PROTOCOL_VERSION, Refusal, Request, check_id, clock_ahead};
 use crate::outbox::Outbox;
 use crate::plane::{Frame, Plane, Size, down_key, hub_token, join_key, participant_token, up_key};
 use crate::queue::{Events, Feed, queue};
@@ -106,6 +107,8 @@ struct Shared {
     tally: Arc<Tally>,
     /// The living session's way out, if there is one.
     inbox: Mutex<Option<Arc<Inbox<LineEvent>>>>,
+    /// How far this host's clock is ahead of the hub's \[ns\]; zero if they may agree.
+    ahead_ns: AtomicI64,
     /// Whether the program is about to leave: a hub that goes then is not missed.
     leaving: AtomicBool,
 }
@@ -137,8 +140,13 @@ impl Line {
         let (events, receiver) = queue(config.queue);
         let (signals, orders) = mpsc::channel();
         let tally = Arc::new(Tally::of("the network-emulator"));
-        let shared =
-            Arc::new(Shared { id: config.id, tally, inbox: Mutex::default(), leaving: AtomicBool::new(false) });
+        let shared = Arc::new(Shared {
+            id: config.id,
+            tally,
+            inbox: Mutex::default(),
+            ahead_ns: AtomicI64::new(0),
+            leaving: AtomicBool::new(false),
+        });
         let mut keeper = Keeper {
             endpoint: config.endpoint,
             // A number that no other incarnation of this participant has; the standard library's hasher has a seed.
@@ -169,6 +177,14 @@ impl Line {
     /// Whether messages pass at this moment.
     pub fn is_connected(&self) -> bool {
         self.shared.inbox().is_some_and(|inbox| inbox.is_open())
+    }
+
+    /// How far this host's clock is from the hub's, in words, if that is more than a second and the hub did not just answer late.
+    pub fn clock_off(&self) -> Option<String> {
+        let ahead_s = self.shared.ahead_ns.load(Ordering::Relaxed) as f64 / 1e9;
+        let way = if ahead_s > 0.0 { "ahead of" } else { "behind" };
+        (ahead_s != 0.0)
+            .then(|| format!("clock of {} seems {:.1} s {way} the network-emulator's", self.shared.id, ahead_s.abs()))
     }
 
     /// Who joined.
@@ -376,6 +392,7 @@ impl Keeper {
         let absent = |why: &str| Setback::Absent(why.to_owned());
         let request = Request { version: PROTOCOL_VERSION, nonce: self.nonce };
         let question = format!("{}?{}", join_key(&self.shared.id), request.encode());
+        let asked_ns = unix_ns();
         let replies = lobby.get(question).timeout(step).wait().map_err(|error| absent(&error.to_string()))?;
         let Ok(reply) = replies.recv() else {
             return Err(absent("something listens there, but does not answer as a network-emulator"));
@@ -383,7 +400,10 @@ impl Keeper {
         match reply.result() {
             Ok(sample) => {
                 let text = sample.payload().try_to_string().unwrap_or_default();
-                Admission::decode(&text).ok_or_else(|| absent("its answer is not understood"))
+                let admission = Admission::decode(&text).ok_or_else(|| absent("its answer is not understood"))?;
+                let ahead_ns = admission.unix_ns.and_then(|hub_ns| clock_ahead(asked_ns, unix_ns(), hub_ns));
+                self.shared.ahead_ns.store(ahead_ns.unwrap_or(0), Ordering::Relaxed);
+                Ok(admission)
             }
             Err(error) => {
                 let text = error.payload().try_to_string().unwrap_or_default();

@@ -1,7 +1,7 @@
 //! The words exchanged in the lobby: a participant asks for its line, the hub names a port or a reason.
 //!
 //! The request is a query on `cpf/join/<id>` with the parameters `version=2;nonce=<hex>`; the answer is the text
-//! `port=<n>;version=2`, or an error reply `<code>: <reason>`. The nonce tells one incarnation of a participant
+//! `port=<n>;version=2;clock=<ns>`, or an error reply `<code>: <reason>`. The nonce tells one incarnation of a participant
 //! from the next.
 
 use std::fmt;
@@ -119,16 +119,31 @@ impl Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Admission {
     pub(crate) port: u16,
+    /// The hub's wall clock when it answered \[ns of the UNIX epoch\].
+    pub(crate) unix_ns: Option<i64>,
 }
 
 impl Admission {
     pub(crate) fn encode(self) -> String {
-        format!("port={};version={PROTOCOL_VERSION}", self.port)
+        let clock = self.unix_ns.map_or(String::new(), |unix_ns| format!(";clock={unix_ns}"));
+        format!("port={};version={PROTOCOL_VERSION}{clock}", self.port)
     }
 
     pub(crate) fn decode(text: &str) -> Option<Admission> {
-        Some(Admission { port: field(text, "port")?.parse().ok()? })
+        let unix_ns = field(text, "clock").and_then(|clock| clock.parse().ok());
+        Some(Admission { port: field(text, "port")?.parse().ok()?, unix_ns })
     }
+}
+
+/// Clocks that agree to within this are those of one fleet \[ns\].
+const AGREED_NS: i64 = 1_000_000_000;
+
+/// How far the clock of a participant is ahead of the hub's \[ns\], from when it asked and when it had its answer on its own clock,
+/// and when the hub answered on its own; `None` if both may agree: an answer may have taken long.
+pub(crate) fn clock_ahead(asked_ns: i64, answered_ns: i64, hub_ns: i64) -> Option<i64> {
+    let (least, most) = (asked_ns.saturating_sub(hub_ns), answered_ns.saturating_sub(hub_ns));
+    let off = least > AGREED_NS || most < -AGREED_NS;
+    off.then_some(least / 2 + most / 2)
 }
 
 fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
@@ -143,7 +158,7 @@ mod tests {
     fn requests_admissions_and_refusals_survive_the_wire() {
         let request = Request { version: 7, nonce: 0x00ab_cdef };
         assert_eq!(Request::decode(&request.encode()), Some(request));
-        let admission = Admission { port: 40_123 };
+        let admission = Admission { port: 40_123, unix_ns: Some(-1_700_000_000_000_000_001) };
         assert_eq!(Admission::decode(&admission.encode()), Some(admission));
         for refusal in [
             Refusal::Taken { id: "auv1".into() },
@@ -160,8 +175,20 @@ mod tests {
         for text in ["", "version=1", "nonce=0", "version=x;nonce=0", "version=1;nonce=xyz", "version=1;nonce=-1"] {
             assert_eq!(Request::decode(text), None, "{text}");
         }
-        assert_eq!(Admission::decode("port=99999"), None);
+        assert_eq!(Admission::decode("port=99999;clock=0"), None);
+        assert_eq!(Admission::decode("port=9;clock=x"), Some(Admission { port: 9, unix_ns: None }));
         assert_eq!(Refusal::decode("version: 1"), None);
+    }
+
+    #[test]
+    fn clocks_are_off_only_if_no_delay_explains_it() {
+        const S: i64 = 1_000_000_000;
+        let ahead = |asked: i64, answered: i64| clock_ahead(100 * S + asked, 100 * S + answered, 100 * S);
+        assert_eq!(ahead(-S / 10, S / 10), None);
+        assert_eq!(ahead(-20 * S, S / 10), None, "the answer took 20 s");
+        assert_eq!(ahead(29 * S / 10, 31 * S / 10), Some(3 * S));
+        assert_eq!(ahead(-3601 * S, -3599 * S), Some(-3600 * S));
+        assert_eq!(clock_ahead(i64::MAX, i64::MAX, i64::MIN), Some(i64::MAX / 2 * 2));
     }
 
     #[test]

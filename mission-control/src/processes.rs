@@ -97,9 +97,9 @@ impl Processes {
     /// A single process under this name.
     #[cfg(test)]
     pub(crate) fn of(name: &str, child: Child) -> Processes {
-        let mut one = Processes::default();
-        one.running.insert(name.to_string(), child);
-        one
+        let mut processes = Processes::default();
+        processes.running.insert(name.to_string(), child);
+        processes
     }
 
     /// Whether this process is there; one that has ended is not started again.

@@ -12,7 +12,7 @@ use bus::logs::Logs;
 use bus::setup::Endpoint;
 use bus::{Plane, Refusal};
 use clap::Parser;
-use common::record::{ClockRecord, Name, Overrun, OverrunRow, Row};
+use common::record::{ClockRecord, Name, NoteRow, Overrun, OverrunRow, Row};
 use common::wire::vehicle::{Phase, ToVehicle};
 use common::wire::{self, GarbageCount};
 
@@ -165,6 +165,16 @@ impl VehiclePort {
     }
 }
 
+impl VehiclePort {
+    /// Of a flight on the wall clock, that this host's is not that of the fleet.
+    fn record_clock_off(&mut self) {
+        if let Some(text) = self.line.clock_off().filter(|_| self.start_unix_ns.is_some()) {
+            let row = NoteRow { t_ns: 0, source: self.id.clone(), text, count: 1 };
+            self.logs.write(Row::Clock(ClockRecord::Note(row)));
+        }
+    }
+}
+
 impl Port for VehiclePort {
     type Machine = VehicleNode;
     type Event = LineEvent;
@@ -174,6 +184,9 @@ impl Port for VehiclePort {
         match event {
             LineEvent::Connected => {
                 tracing::info!("{}: connected", self.id);
+                if let Some(off) = self.line.clock_off() {
+                    tracing::warn!("{off}: in a flight on the wall clock it would be where the others are not");
+                }
                 Some((None, NodeInput::Connected))
             }
             LineEvent::Lost => {
@@ -217,7 +230,10 @@ impl Port for VehiclePort {
                 // What was dropped before is not of this flight.
                 self.record_overruns(false);
                 return Next::Feed(match self.logs.open(&mission.0, self.start_unix_ns, fresh) {
-                    Ok(earlier) => NodeInput::LogOpened { last: earlier.last_state.map(Box::new) },
+                    Ok(earlier) => {
+                        self.record_clock_off();
+                        NodeInput::LogOpened { last: earlier.last_state.map(Box::new) }
+                    }
                     Err(reason) => {
                         tracing::error!("{}: {reason}", self.id);
                         self.recording_failed = true;

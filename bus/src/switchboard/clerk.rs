@@ -14,6 +14,7 @@ use zenoh::{Session, Wait};
 
 use super::lines::{HubLine, Lines};
 use super::{HubEvent, LineId, Shortcut, SwitchboardConfig};
+use crate::clock::unix_ns;
 use crate::counts::Tally;
 use crate::error::{Error, Result};
 use crate::inbox::{Handshake, Inbox};
@@ -188,7 +189,7 @@ impl Clerk {
             }
             // The answer was late, and the participant asks again.
             if same && session.inbox.is_waiting() {
-                return Ok(Ok(Admission { port: session.port }));
+                return Ok(Ok(Admission { port: session.port, unix_ns: Some(unix_ns()) }));
             }
             // The participant has lost its session before the hub noticed, or never came for it.
             self.retire(line);
@@ -196,7 +197,7 @@ impl Clerk {
         let session = self.open_line(line, id, request.nonce)?;
         let port = session.port;
         self.sessions.insert(line, session);
-        Ok(Ok(Admission { port }))
+        Ok(Ok(Admission { port, unix_ns: Some(unix_ns()) }))
     }
 
     /// The line of a participant, a new one if need be; none if there is no place.

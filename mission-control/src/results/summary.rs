@@ -225,7 +225,9 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
     }
     // What the network was not: the numbers are of a fleet that nobody meant.
     let asleep = recording.clock.iter().filter_map(|record| match record {
-        ClockRecord::Note(row) if row.text.starts_with(ASLEEP) => Some(format!("{}.", row.text)),
+        ClockRecord::Note(row) if row.text.starts_with(ASLEEP) || row.text.starts_with("clock of ") => {
+            Some(format!("{}.", row.text))
+        }
         _ => None,
     });
     warnings.extend(asleep);
@@ -287,12 +289,15 @@ mod tests {
     }
 
     #[test]
-    fn a_network_that_was_not_there_is_warned_of() {
+    fn a_network_that_was_not_there_and_a_clock_that_is_off_are_warned_of() {
         let mut recording = fleet(false);
         let text = format!("{ASLEEP} from 5.000 s to 38.000 s; every link was down meanwhile");
         let row = NoteRow { t_ns: 9, source: "network-emulator".into(), text: text.clone(), count: 1 };
         recording.clock.push(ClockRecord::Note(row));
-        assert_eq!(summarise(&recording, &facts(false)).warnings, [text + "."]);
+        let off = "clock of v2 seems 3.0 s ahead of the network-emulator's".to_string();
+        let row = NoteRow { t_ns: 0, source: "v2".into(), text: off.clone(), count: 1 };
+        recording.clock.push(ClockRecord::Note(row));
+        assert_eq!(summarise(&recording, &facts(false)).warnings, [text + ".", off + "."]);
     }
 
     #[test]
