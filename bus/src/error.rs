@@ -36,6 +36,8 @@ pub enum Error {
         /// The last reason.
         why: String,
     },
+    /// The hub was waited for until there was a reason to wait no longer.
+    InVain(String),
     /// The hub answered, and said no.
     Refused(Refusal),
     /// The line has no living session at this moment; the message was not sent.
@@ -98,6 +100,7 @@ impl fmt::Display for Error {
             Error::NoHub { endpoint, waited, why } => {
                 write!(f, "no network-emulator at {endpoint} after {:.1} s: {why}", waited.as_secs_f64())
             }
+            Error::InVain(why) => f.write_str(why),
             Error::Refused(refusal) => refusal.fmt(f),
             Error::NotConnected => f.write_str("the line is not connected"),
             Error::NoSuchLine => f.write_str("there is no such line"),

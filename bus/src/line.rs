@@ -125,6 +125,14 @@ impl Line {
     /// Ends with an error if the hub refuses, or does not appear within the patience. That the identity is in use is
     /// believed only after two and a half seconds: it may be this participant's own ghost, killed a moment ago.
     pub fn connect(config: LineConfig) -> Result<(Line, Events<LineEvent>)> {
+        Line::connect_unless(config, &mut || None)
+    }
+
+    /// Likewise, until there is a reason to wait no longer: it is asked for after every attempt, ten times a second or so.
+    pub fn connect_unless(
+        config: LineConfig,
+        in_vain: &mut dyn FnMut() -> Option<String>,
+    ) -> Result<(Line, Events<LineEvent>)> {
         check_id(&config.id).map_err(Error::Refused)?;
         let (events, receiver) = queue(config.queue);
         let (signals, orders) = mpsc::channel();
@@ -141,7 +149,7 @@ impl Line {
             orders,
             link: None,
         };
-        keeper.join_hub(config.patience, Duration::ZERO)?;
+        keeper.join_hub(config.patience, Duration::ZERO, in_vain)?;
         let keeper = std::thread::Builder::new()
             .name("bus-line".into())
             .spawn(move || keeper.keep())
@@ -258,7 +266,7 @@ impl Keeper {
                         return;
                     }
                     // That it is looked for was said.
-                    match self.join_hub(None, REMINDER) {
+                    match self.join_hub(None, REMINDER, &mut || None) {
                         Ok(()) => tracing::info!("{}: the network-emulator is back", self.shared.id),
                         Err(Error::Refused(refusal)) => {
                             tracing::error!("{}: the network-emulator is back, but {refusal}", self.shared.id);
@@ -285,8 +293,14 @@ impl Keeper {
         }
     }
 
-    /// Tries until it works, at first in silence, the patience ends, the hub's refusal is final, or the program closes the line.
-    fn join_hub(&mut self, patience: Option<Duration>, silence: Duration) -> Result<()> {
+    /// Tries until it works, at first in silence, the patience ends, it is in vain, the hub's refusal is final, or the program
+    /// closes the line.
+    fn join_hub(
+        &mut self,
+        patience: Option<Duration>,
+        silence: Duration,
+        in_vain: &mut dyn FnMut() -> Option<String>,
+    ) -> Result<()> {
         let begun = Instant::now();
         let mut reminder = begun + silence;
         let mut taken_since: Option<Instant> = None;
@@ -307,6 +321,9 @@ impl Keeper {
                     why
                 }
             };
+            if let Some(why) = in_vain() {
+                return Err(Error::InVain(why));
+            }
             let waited = begun.elapsed();
             if patience.is_some_and(|patience| waited >= patience) {
                 return Err(Error::NoHub { endpoint: self.endpoint.clone(), waited, why });

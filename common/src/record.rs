@@ -191,7 +191,8 @@ impl Settled {
     /// The row that compares the commanded delay with the achieved one, if the clock is a real one.
     pub fn achieved(&self, from: &Name, to: &Name) -> Option<AchievedRow> {
         let Settled { t_ns, seq, sent_ns, due_ns, .. } = *self;
-        let commanded_ns = due_ns - sent_ns;
+        // Of a forged recording it is none; its reader refuses it.
+        let commanded_ns = due_ns.saturating_sub(sent_ns);
         self.late_ns.map(|late_ns| AchievedRow { t_ns, from: from.clone(), to: to.clone(), seq, commanded_ns, late_ns })
     }
 }

@@ -438,7 +438,10 @@ mod tests {
         assert!(attached.ends_with(&format!("report {} --logs LOGS", run.display())), "{attached}");
         // What is said is so: the same command with the same folder is let in.
         assert_eq!(make(Some(&run), &mission), Ok(run.clone()));
-        fs::create_dir_all(run.join("logs")).expect("makes");
+        let logs = run.join("logs/0");
+        fs::create_dir_all(&logs).expect("makes");
+        assert!(told().contains("was over before it began"), "{}", told());
+        fs::write(logs.join("auv1.mcap"), "").expect("writes");
         assert!(told().contains("makes it of the logs"), "{}", told());
     }
 

@@ -25,7 +25,12 @@ const FAREWELL: Duration = Duration::from_secs(3);
 pub(crate) struct Processes {
     running: BTreeMap<String, Child>,
     ended: Vec<String>,
+    /// Whether one of them ended because it could keep no logs.
+    logless: bool,
 }
+
+/// With this exit code a process says that it can keep no logs.
+const LOGLESS: i32 = 4;
 
 impl Processes {
     /// Starts the emulator, then a process per vehicle. All are this very program under other names.
@@ -52,7 +57,7 @@ impl Processes {
         processes.running.insert(HUB.into(), emulator);
         let endpoint: Endpoint = endpoint.trim().parse().map_err(|_| {
             let _ = processes.end();
-            Failure::Unreachable(format!("the network-emulator did not come up: {}", last_words(&logs)))
+            processes.failure(format!("the network-emulator did not come up: {}", last_words(&logs)))
         })?;
         bus::remark!("network-emulator listens on {endpoint}; another terminal can use --attach {endpoint}");
         for vehicle in &mission.vehicles {
@@ -70,7 +75,9 @@ impl Processes {
 
     fn spawn(&self, logs: &Path, name: &str, arguments: &[&str]) -> Result<Child, Failure> {
         let failed = |error: io::Error| Failure::Unreachable(format!("cannot start {name}: {error}"));
-        let said = File::create(logs.join(format!("{name}.log"))).map_err(failed)?;
+        let log = logs.join(format!("{name}.log"));
+        let said =
+            File::create(&log).map_err(|error| Failure::Files(format!("cannot write {}: {error}", log.display())))?;
         let program = if name == HUB { HUB } else { "vehicle-node" };
         Command::new(std::env::current_exe().map_err(failed)?)
             .arg(program)
@@ -85,6 +92,14 @@ impl Processes {
             .stderr(said)
             .spawn()
             .map_err(failed)
+    }
+
+    /// A single process under this name.
+    #[cfg(test)]
+    pub(crate) fn of(name: &str, child: Child) -> Processes {
+        let mut one = Processes::default();
+        one.running.insert(name.to_string(), child);
+        one
     }
 
     /// Whether this process is there; one that has ended is not started again.
@@ -102,11 +117,20 @@ impl Processes {
         &self.ended
     }
 
+    /// Why there is no flight: own processes could not be started, or can keep no logs.
+    pub(crate) fn failure(&self, why: String) -> Failure {
+        match self.logless {
+            true => Failure::Files(format!("{why} (exit status {LOGLESS}: no logs can be kept; is the disk full?)")),
+            false => Failure::Unreachable(why),
+        }
+    }
+
     /// Processes that have ended since the last look, in words.
     pub(crate) fn look(&mut self) -> Vec<String> {
         let mut news = Vec::new();
         self.running.retain(|name, child| match child.try_wait() {
             Ok(Some(status)) => {
+                self.logless |= status.code() == Some(LOGLESS);
                 news.push(format!("{name} has ended ({status})"));
                 false
             }

@@ -31,6 +31,9 @@ use crate::results::{ClockSummary, Summary};
 /// How long own processes may take to come up.
 const OWN_PATIENCE: Duration = Duration::from_secs(60);
 
+/// Why a run ended whose fleet had not answered yet.
+const INTERRUPTED: &str = "interrupted before the flight";
+
 /// How a flight shall be flown.
 pub struct Plan {
     /// The mission.
@@ -114,7 +117,18 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
             (endpoint, processes, Some(folder))
         }
     };
-    let (line, events) = connect(endpoint, plan.patience())?;
+    let mut in_vain = || if plan.is_own() { in_vain(&mut processes, stop.is_raised()) } else { None };
+    let connected = connect(endpoint, plan.patience(), &mut in_vain);
+    let (line, events) = connected.map_err(|failure| {
+        processes.terminate();
+        processes.end();
+        folder.iter().for_each(|folder| discard(folder));
+        match failure {
+            _ if plan.is_own() && stop.is_raised() => Failure::Refused(INTERRUPTED.to_string()),
+            Failure::Unreachable(why) => processes.failure(why),
+            failure => failure,
+        }
+    })?;
     // Of an own fleet it is armed already, and may have been raised meanwhile.
     if !plan.is_own() {
         stop.arm();
@@ -166,15 +180,33 @@ pub fn fly(plan: &Plan) -> Result<Flown, Failure> {
 }
 
 /// The line to a fleet.
-fn connect(endpoint: Endpoint, patience: Option<Duration>) -> Result<(Line, Events<LineEvent>), Failure> {
+fn connect(
+    endpoint: Endpoint,
+    patience: Option<Duration>,
+    in_vain: &mut dyn FnMut() -> Option<String>,
+) -> Result<(Line, Events<LineEvent>), Failure> {
     let mut config = LineConfig::new(endpoint, COLLECTOR);
     config.patience = patience;
-    Line::connect(config).map_err(|error| match error {
+    Line::connect_unless(config, in_vain).map_err(|error| match error {
         bus::Error::Refused(refusal @ Refusal::Taken { .. }) => Failure::Unreachable(format!(
             "{refusal} to this fleet: another run conducts it. Wait until that is over, or end it with: mission-control stop"
         )),
         error => Failure::Unreachable(error.to_string()),
     })
+}
+
+/// Why an own fleet that does not answer yet never will, or need not.
+fn in_vain(processes: &mut Processes, interrupted: bool) -> Option<String> {
+    processes.look();
+    if interrupted {
+        return Some(INTERRUPTED.to_string());
+    }
+    (!processes.has_hub()).then(|| ended_early(processes))
+}
+
+/// What is told of own processes that ended before the flight.
+fn ended_early(processes: &Processes) -> String {
+    format!("{} before the flight; see its log in logs/, if it has one", processes.ended().join(", "))
 }
 
 /// Conducts the flight to its end; gives the line back.
@@ -465,8 +497,7 @@ impl Port for ConductPort<'_> {
             return Next::Feed(ConductInput::Interrupt);
         }
         if self.own && matches!(conduct.step(), Step::Contact | Step::Arming) && !self.processes.ended().is_empty() {
-            let ended = self.processes.ended().join(", ");
-            return Next::Exit(Err(Failure::Unreachable(format!("{ended} before the flight; see its log in logs/"))));
+            return Next::Exit(Err(self.processes.failure(ended_early(self.processes))));
         }
         if self.own && !self.processes.has_hub() {
             // Nobody will start it again; what was recorded is worth a report.
@@ -488,7 +519,41 @@ impl Port for ConductPort<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::process::Command;
+
+    use network_emulator::hub::HUB;
+
     use super::*;
+
+    #[test]
+    fn a_fleet_whose_emulator_has_ended_is_not_waited_for() {
+        let process = |script: &str| Command::new("sh").args(["-c", script]).spawn().expect("starts");
+        let mut sound = Processes::of(HUB, process("sleep 60"));
+        assert_eq!(in_vain(&mut sound, false), None);
+        assert_eq!(in_vain(&mut sound, true).as_deref(), Some(INTERRUPTED));
+        let mut killed = Processes::of(HUB, process("kill -9 $$"));
+        let begun = Instant::now();
+        let why = loop {
+            match in_vain(&mut killed, false) {
+                Some(why) => break why,
+                None => assert!(begun.elapsed() < Duration::from_secs(20), "it is noticed"),
+            }
+        };
+        assert!(why.contains("SIGKILL") && why.contains("before the flight"), "{why}");
+        assert!(matches!(killed.failure(why), Failure::Unreachable(_)));
+    }
+
+    #[test]
+    fn a_fleet_that_can_keep_no_logs_is_a_matter_of_files() {
+        let child = Command::new("sh").args(["-c", "exit 4"]).spawn().expect("starts");
+        let mut processes = Processes::of("auv1", child);
+        let begun = Instant::now();
+        while processes.look().is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(20), "it is noticed");
+        }
+        let failure = processes.failure(ended_early(&processes));
+        assert!(matches!(&failure, Failure::Files(why) if why.contains("is the disk full?")), "{failure:?}");
+    }
 
     fn status(phase: Phase, now_s: f64) -> FleetStatus {
         FleetStatus {

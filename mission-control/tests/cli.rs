@@ -24,6 +24,15 @@ fn a_wrong_option_is_exit_code_2_and_no_panic() {
     assert!(text.contains("--no-such-option") && !text.contains("panicked"), "{text}");
 }
 
+#[test]
+fn a_search_of_no_flights_is_exit_code_2() {
+    let options = ["--alpha", "0.5", "--t0", "5", "--dwell", "2.5", "--flights", "0"];
+    let wrong = run(&[&["worst", "../missions/auv-helix.toml"][..], &options].concat());
+    let text = String::from_utf8_lossy(&wrong.stderr).into_owned();
+    assert_eq!(wrong.status.code(), Some(2), "{text}");
+    assert!(text.contains("--flights") && text.contains("allowed: a whole number from 1"), "{text}");
+}
+
 /// A robot that starts where a circle's points are all equally near is counted a warning in its first control periods.
 #[test]
 fn counted_warnings_of_a_flight_are_told_and_stay_out_of_the_json() {

@@ -408,6 +408,27 @@ fn a_vehicle_that_was_frozen_comes_back_into_line() {
     assert!(missed.is_some_and(|missed| missed >= 200), "two seconds at 50 ms, ten times as fast: {missed:?}");
 }
 
+/// What the plan says was up while nothing was carried is no measurement of the network.
+#[test]
+fn an_emulator_that_was_frozen_records_that_every_link_was_down() {
+    let mut fleet = Fleet::under_way(3000.0);
+    fleet.emulator.freeze();
+    for vehicle in &fleet.vehicles {
+        until(PATIENCE, "the vehicle misses the emulator", || vehicle.stderr().contains("lost the network-emulator"));
+    }
+    fleet.emulator.thaw();
+    fleet.status_until("everyone is back", all_fly);
+    fleet.flies_on(20.0);
+    fleet.stop();
+    let summary = fleet.ground.json("run/summary.json");
+    let warnings = summary["warnings"].to_string();
+    assert!(warnings.contains("the emulator was not let run from"), "{warnings}");
+    assert!(summary["fleet"]["connectivity"]["alpha"].as_f64() > Some(0.0), "{}", summary["fleet"]["connectivity"]);
+    for link in summary["links"].as_array().expect("links") {
+        assert!(link["longest_outage_s"].as_f64() > Some(10.0), "more than a second, ten times as fast: {link}");
+    }
+}
+
 /// A run that starts its own processes, in a group of its own as under a terminal, once every vehicle records.
 fn own_flight(ground: &Ground) -> Process {
     own_flight_of(ground, &mission_text(MISSION))

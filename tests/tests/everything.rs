@@ -21,9 +21,8 @@ fn everything_is_on_and_more_than_half_of_the_messages_arrive() {
         }
     };
     simulate(&mission, count, |_| true).expect("flies");
-    // In a simulation everyone is there.
-    let expected = Fate::ALL.into_iter().filter(|fate| *fate != Fate::ReceiverAbsent);
-    for fate in expected {
+    // In a simulation everyone is there; whether a copy is under way at the end is chance.
+    for fate in Fate::ALL.into_iter().filter(|fate| ![Fate::ReceiverAbsent, Fate::CopyInFlight].contains(fate)) {
         assert!(fates.contains_key(fate.as_str()), "{} in {fates:?}", fate.as_str());
     }
     let of_copies: f64 = Fate::ALL.iter().filter(|f| f.is_of_copy()).filter_map(|f| fates.get(f.as_str())).sum();

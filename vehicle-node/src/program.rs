@@ -21,6 +21,9 @@ use crate::node::{NodeInput, NodeOutput, VehicleNode};
 /// Between two rows about messages that were dropped.
 const OVERRUN_PERIOD: Duration = Duration::from_secs(1);
 
+/// Why a vehicle that was started for one run ends without being asked to.
+const PARENT_GONE: &str = "mission-control is gone; ended";
+
 /// One vehicle of a fleet: simulates its body, follows its path, and coordinates with the others by sending nothing but
 /// its coordination state.
 ///
@@ -72,8 +75,14 @@ pub fn run(args: Args) -> ExitCode {
     }
     let mut config = LineConfig::new(args.connect, id.as_str());
     config.patience = args.patience;
-    let (line, events) = match Line::connect(config) {
+    let parent = args.end_with_stdin.then(Parent::at_stdin);
+    let mut in_vain = || parent.as_ref().filter(|parent| parent.is_gone()).map(|_| PARENT_GONE.to_string());
+    let (line, events) = match Line::connect_unless(config, &mut in_vain) {
         Ok(line) => line,
+        Err(bus::Error::InVain(why)) => {
+            tracing::info!("{id}: {why}");
+            return ExitCode::SUCCESS;
+        }
         Err(error) => {
             tracing::error!("{id}: {error}");
             return ExitCode::from(3);
@@ -87,7 +96,7 @@ pub fn run(args: Args) -> ExitCode {
         line,
         stop,
         once: args.once,
-        parent: args.end_with_stdin.then(Parent::at_stdin),
+        parent,
         rest: Rest::default(),
         garbage: GarbageCount::default(),
         overruns: [0; 2],
@@ -244,7 +253,7 @@ impl Port for VehiclePort {
             return Next::Exit(self.exit_code());
         }
         if self.parent.as_ref().is_some_and(Parent::is_gone) && node.phase() != Phase::Running {
-            tracing::info!("{}: mission-control is gone; ended", self.id);
+            tracing::info!("{}: {PARENT_GONE}", self.id);
             return Next::Exit(self.exit_code());
         }
         if self.stop.is_raised() {

@@ -274,14 +274,26 @@ impl Contents {
         match mcap::parse_record(opcode, data) {
             Ok(records::Record::Message { header, data }) => {
                 if let Some(vehicles) = self.packs.get(&header.channel_id) {
+                    let before = self.rows.len();
                     let unpacked = unpack(&data, vehicles, |row| self.rows.push_back(row));
-                    return unpacked.then_some(()).ok_or(Trouble::Foreign("a pack of messages cannot be read".into()));
+                    let credible = self.rows.range(before..).all(is_credible);
+                    if !(unpacked && credible) {
+                        self.rows.truncate(before);
+                    }
+                    return match (unpacked, credible) {
+                        (false, _) => Err(Trouble::Foreign("a pack of messages cannot be read".into())),
+                        (true, false) => Err(Trouble::Damaged("a pack of messages has numbers that cannot be".into())),
+                        (true, true) => Ok(()),
+                    };
                 }
                 let Some(topic) = self.topics.get(&header.channel_id) else { return Ok(()) };
                 let row = topic.decode(&data);
-                self.rows.push_back(
-                    row.map_err(|cause| Trouble::Foreign(format!("a row of {topic:?} cannot be read: {cause}")))?,
-                );
+                let row =
+                    row.map_err(|cause| Trouble::Foreign(format!("a row of {topic:?} cannot be read: {cause}")))?;
+                if !is_credible(&row) {
+                    return Err(Trouble::Damaged(format!("a row of {topic:?} has numbers that cannot be")));
+                }
+                self.rows.push_back(row);
             }
             Ok(records::Record::Channel(channel)) if channel.topic == SETTLED && channel.message_encoding == PACKED => {
                 let names = channel.metadata.get(VEHICLES).map_or("", String::as_str);
@@ -313,6 +325,28 @@ impl Contents {
     }
 }
 
+/// No mission lasts longer than 30 days; a day more is for what is said before its begin and after its end \[ns\].
+const FARTHEST_NS: u64 = 31 * 86_400 * 1_000_000_000;
+/// A message may be due long after the end of its mission, but not so late that instants cannot be subtracted \[ns\].
+const LATEST_NS: u64 = i64::MAX as u64 / 4;
+/// No process counts as far as this; the counts of a million rows can still be added up.
+const MOST: u64 = 1 << 44;
+
+/// Whether the numbers of a row can be those of a flight: what reads the rows subtracts instants and adds counts.
+fn is_credible(row: &Row) -> bool {
+    let near = |t_ns: i64| t_ns.unsigned_abs() <= FARTHEST_NS;
+    let ever = |t_ns: i64| t_ns.unsigned_abs() <= LATEST_NS;
+    near(row.t_ns())
+        && match row {
+            Row::Exact(Record::Message(row)) => near(row.sent_ns) && ever(row.due_ns) && row.seq <= MOST,
+            Row::Exact(Record::Warning(row)) | Row::Clock(ClockRecord::Note(row)) => row.count <= MOST,
+            Row::Exact(Record::State(_) | Record::Topology(_) | Record::Speed(_)) => true,
+            Row::Clock(ClockRecord::Achieved(row)) => ever(row.commanded_ns) && ever(row.late_ns) && row.seq <= MOST,
+            Row::Clock(ClockRecord::Ticks(row)) => row.met <= MOST && row.missed <= MOST && ever(row.worst_late_ns),
+            Row::Clock(ClockRecord::Overrun(row)) => row.count <= MOST,
+        }
+}
+
 impl<R: Read> Iterator for RowReader<R> {
     type Item = Result<Row>;
 
@@ -334,7 +368,11 @@ fn read_some(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
 #[cfg(test)]
 mod tests {
     use super::super::Recorder;
-    use super::super::testing::{SharedDisk, origin, tick};
+    use std::collections::BTreeSet;
+
+    use common::record::MessageRow;
+
+    use super::super::testing::{SharedDisk, message, origin, state, tick};
     use super::*;
 
     const ROWS_PER_TICK: usize = 8;
@@ -402,6 +440,32 @@ mod tests {
         }
         // Damage in what a chunk holds is skipped; damage in its header, a few bytes, may end the reading.
         assert!(skipped > 150 && skipped > 5 * ended, "{skipped} skipped, {ended} ended");
+    }
+
+    /// Sound framing proves nothing: whoever wrote the file may have written anything.
+    #[test]
+    fn rows_with_numbers_that_cannot_be_are_damaged() {
+        let late = |row: Row| match row {
+            Row::Exact(Record::Message(row)) => Row::Exact(Record::Message(MessageRow { due_ns: i64::MIN, ..row })),
+            other => other,
+        };
+        for forged in [state(i64::MIN, "a", 0.0), state(i64::MAX, "a", 0.0), late(message(1, "a", "b", 9))] {
+            let disk = SharedDisk::default();
+            let mut recorder = Recorder::new(disk.clone(), "shared", &origin()).expect("starts");
+            for t_ns in 0..3 {
+                tick(t_ns).iter().for_each(|row| recorder.write(row).expect("writes"));
+                if t_ns == 1 {
+                    recorder.write(&forged).expect("writes");
+                }
+                recorder.flush().expect("flushes");
+            }
+            recorder.finish().expect("ends");
+            let recording = read_from(&disk.bytes()[..], "forged.mcap").expect("reads");
+            let instants: BTreeSet<i64> = recording.exact.iter().map(Record::t_ns).collect();
+            assert_eq!(instants, BTreeSet::from([0, 2]), "the chunk with the forged row is left out");
+            let damage = recording.damage.expect("told");
+            assert!(!recording.complete && damage.ends_with("has numbers that cannot be"), "{damage}");
+        }
     }
 
     #[test]

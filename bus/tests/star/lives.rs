@@ -253,3 +253,17 @@ fn patience_ends_where_there_is_no_hub() {
     assert!(error.to_string().contains(&endpoint.to_string()), "{error}");
     assert!(matches!(error, Error::NoHub { .. }));
 }
+
+/// A vehicle whose starter is gone must not look for a hub that will never come.
+#[test]
+fn waiting_ends_when_it_is_in_vain() {
+    let mut asked = 0;
+    let mut in_vain = || {
+        asked += 1;
+        (asked == 3).then(|| "mission-control is gone".to_string())
+    };
+    let error =
+        Line::connect_unless(LineConfig::new(free_endpoint(), "auv1"), &mut in_vain).expect_err("nobody is there");
+    assert_eq!(error, Error::InVain("mission-control is gone".to_string()));
+    assert_eq!(asked, 3);
+}

@@ -9,6 +9,7 @@ use bus::setup::Endpoint;
 use common::mission::Mission;
 use common::wire::fleet::Pace;
 use common::wire::vehicle::{ClockPlan, Phase};
+use network_emulator::hub::ENDED;
 
 use super::mission::{load, print_theory, warn};
 use super::{End, Ended};
@@ -104,6 +105,10 @@ pub(super) fn run(args: RunArgs) -> Ended {
     };
     match fly(&plan) {
         Ok(flown) => {
+            // Vehicles that gave up are among the warnings; that they had to may have a reason that none of them knows.
+            for why in flown.clock.notes.iter().filter(|note| note.text.starts_with(ENDED)) {
+                bus::remark!("{}", why.text);
+            }
             let clock = flown.clock.verdict.as_ref();
             tell(&mission, &flown.folder, flown.phase, flown.sound, &flown.summary, clock, args.json)
         }

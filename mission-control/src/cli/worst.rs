@@ -16,19 +16,19 @@ pub(super) struct WorstArgs {
     /// The mission file; if its own switching is admitted, the search begins with it
     mission: PathBuf,
     /// Share of the time that may be lost in the long run, 0 to below 1
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true, value_parser = super::number)]
     alpha: f64,
     /// Connectivity-loss bound T_0 (s)
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = super::number)]
     t0: f64,
     /// Least time between two changes (s)
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = super::number)]
     dwell: f64,
     /// What counts as hurt
     #[arg(long, value_enum, default_value = "end")]
     hurt: Hurt,
     /// How many flights the search may take
-    #[arg(long, default_value = "400")]
+    #[arg(long, default_value = "400", value_parser = at_least_one)]
     flights: usize,
     /// Seed of the search
     #[arg(long, default_value = "1")]
@@ -39,6 +39,10 @@ pub(super) struct WorstArgs {
     /// JSON for a pipe
     #[arg(long)]
     json: bool,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|flights| *flights > 0).ok_or_else(|| "allowed: a whole number from 1".to_string())
 }
 
 pub(super) fn worst(args: &WorstArgs) -> Ended {

@@ -38,6 +38,14 @@ pub(crate) const OUTAGE_LIMIT: usize = 60;
 const WIDTH: f64 = 520.0;
 const HEIGHT: f64 = 360.0;
 
+/// No axis can hold greater values: the length of an axis, with room at its ends, must be a number too.
+const GREATEST: f64 = 1e300;
+
+/// Whether a point has a place on an axis.
+pub(crate) fn can_be_drawn((x, y): &(f64, f64)) -> bool {
+    x.abs() < GREATEST && y.abs() < GREATEST
+}
+
 /// One panel under construction.
 #[derive(Default)]
 pub(crate) struct Panel {
@@ -49,7 +57,9 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
-    pub(crate) fn line(&mut self, points: Vec<(f64, f64)>, style: impl FnOnce(LinePlot) -> LinePlot) {
+    /// A line through those of the points that can be drawn.
+    pub(crate) fn line(&mut self, mut points: Vec<(f64, f64)>, style: impl FnOnce(LinePlot) -> LinePlot) {
+        points.retain(can_be_drawn);
         self.drawn.push(points.clone());
         self.plots.push(style(LinePlot::new().with_data(points)).into());
     }
@@ -61,7 +71,8 @@ impl Panel {
     }
 
     pub(crate) fn dot(&mut self, at: (f64, f64), colour: &str, size: f64) {
-        self.plots.push(ScatterPlot::new().with_data([at]).with_color(colour).with_size(size).into());
+        let drawn = Some(at).filter(can_be_drawn);
+        self.plots.push(ScatterPlot::new().with_data(drawn).with_color(colour).with_size(size).into());
     }
 
     pub(crate) fn layout(&self, title: &str, x_label: &str, y_label: &str) -> Layout {

@@ -17,7 +17,7 @@ use kuva::render::layout::Layout;
 use super::Facts;
 use super::decay::{Decay, fitted_where};
 use super::drawing::{
-    Drawing, OUTAGE, OUTAGE_LIMIT, PAPER, PLANNED, Panel, SAMPLES, colour, extremes, render, subscript,
+    Drawing, OUTAGE, OUTAGE_LIMIT, PAPER, PLANNED, Panel, SAMPLES, can_be_drawn, colour, extremes, render, subscript,
 };
 use super::html::number;
 use super::network::Network;
@@ -277,7 +277,7 @@ fn broken(panel: &mut Panel, parts: Vec<Vec<(f64, f64)>>, index: usize, name: &s
     let total = parts.iter().map(Vec::len).sum();
     for (number, points) in parts.into_iter().enumerate() {
         let samples = share(SAMPLES, points.len(), total);
-        let finite = points.into_iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+        let finite = points.into_iter().filter(can_be_drawn).collect();
         piece(panel, extremes(finite, samples), index, name, number);
     }
 }
@@ -309,6 +309,27 @@ mod tests {
         let names = |spatial| figures(&fleet(spatial), &facts(spatial)).into_iter().map(|f| f.name).collect::<Vec<_>>();
         assert_eq!(names(false), ["run", "rate"]);
         assert_eq!(names(true), ["trajectories", "errors", "rate"]);
+    }
+
+    /// A forged row, or one of a vehicle that flew out of all numbers: the length of an axis that holds it is none.
+    #[test]
+    fn what_no_axis_can_hold_is_not_drawn() {
+        for spatial in [false, true] {
+            let mut recording = fleet(spatial);
+            let mut sign = 1.0;
+            for record in recording.exact.iter_mut().step_by(50) {
+                let Record::State(row) = record else { continue };
+                sign = -sign;
+                (row.x_m, row.z_m, row.xi, row.speed_mps) =
+                    (sign * 1.7e308, sign * 1.7e308, sign * 1.7e308, sign * 1.7e308);
+                (row.e_norm_m, row.e_cross_m) = (1.7e308, sign * 1.7e308);
+            }
+            for figure in figures(&recording, &facts(spatial)) {
+                for none in ["NaN", "inf"] {
+                    assert!(!figure.svg.contains(none), "{none} in {}", figure.name);
+                }
+            }
+        }
     }
 
     #[test]

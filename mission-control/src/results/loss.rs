@@ -25,10 +25,20 @@ impl Loss {
     }
 }
 
+/// Of a flight that was ended early vehicles hear one after the other: a second of wall clock may be a minute of mission time. Who
+/// recorded up to this part of it, or so many seconds, was not lost \[s\].
+const ENDING_PART: f64 = 0.05;
+const ENDING_S: f64 = 5.0;
+
 /// The vehicles that were lost, or whose logs were.
 pub(super) fn losses(vehicles: &[VehicleSummary], facts: &Facts) -> Vec<Loss> {
     let end_s = facts.duration_s;
-    let is_gone = |vehicle: &&VehicleSummary| vehicle.rows == 0 || vehicle.early(end_s).is_some();
+    let ending_s = match is_early(end_s, facts.planned_s) {
+        true => (ENDING_PART * end_s).max(ENDING_S),
+        false => 0.0,
+    };
+    let ends_early = |last_s: f64| end_s - last_s > ending_s;
+    let is_gone = |vehicle: &&VehicleSummary| vehicle.rows == 0 || vehicle.early(end_s).is_some_and(ends_early);
     let gone = vehicles.iter().filter(is_gone).filter(|vehicle| !gave_up(&facts.aborted, &vehicle.id));
     gone.map(|vehicle| Loss {
         vehicle: vehicle.id.clone(),

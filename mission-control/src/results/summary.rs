@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use bus::recording::Recording;
-use common::record::Record;
+use common::record::{ClockRecord, Record};
+use network_emulator::hub::ASLEEP;
 use serde::Serialize;
 
 use super::Facts;
@@ -222,6 +223,12 @@ fn warnings(recording: &Recording, vehicles: &[VehicleSummary], links: &[LinkSum
         let periods = if row.count == 1 { "period" } else { "periods" };
         warnings.push(format!("{}: {}, in {} control {periods}.", row.source, row.text, row.count));
     }
+    // What the network was not: the numbers are of a fleet that nobody meant.
+    let asleep = recording.clock.iter().filter_map(|record| match record {
+        ClockRecord::Note(row) if row.text.starts_with(ASLEEP) => Some(format!("{}.", row.text)),
+        _ => None,
+    });
+    warnings.extend(asleep);
     warnings
 }
 
@@ -277,6 +284,15 @@ mod tests {
         let expected =
             ["1 control period.", "40 control periods."].map(|n| format!("v2: an actuator was at its limit, in {n}"));
         assert_eq!(warnings, expected);
+    }
+
+    #[test]
+    fn a_network_that_was_not_there_is_warned_of() {
+        let mut recording = fleet(false);
+        let text = format!("{ASLEEP} from 5.000 s to 38.000 s; every link was down meanwhile");
+        let row = NoteRow { t_ns: 9, source: "network-emulator".into(), text: text.clone(), count: 1 };
+        recording.clock.push(ClockRecord::Note(row));
+        assert_eq!(summarise(&recording, &facts(false)).warnings, [text + "."]);
     }
 
     #[test]
@@ -339,6 +355,22 @@ mod tests {
         // Of a vehicle that was never heard either, nobody knows since when.
         recording.exact.retain(|record| !matches!(record, Record::Message(row) if *row.from == *"v3"));
         assert_eq!(summarise(&recording, &facts(true)).fleet.absences, []);
+    }
+
+    #[test]
+    fn who_hears_of_a_stop_before_the_others_is_not_lost() {
+        let until = |last_s: i64, planned_s: f64| {
+            let mut recording = fleet(true);
+            let late = |record: &Record| match record {
+                Record::State(row) => *row.vehicle == *"v2" && row.t_ns > last_s * 1_000_000_000,
+                Record::Message(row) => *row.from == *"v2" && row.sent_ns > last_s * 1_000_000_000,
+                _ => false,
+            };
+            recording.exact.retain(|record| !late(record));
+            summarise(&recording, &Facts { planned_s, ..facts(true) }).fleet.lost.len()
+        };
+        assert_eq!((until(390, 800.0), until(390, 400.0)), (0, 1));
+        assert_eq!(until(300, 800.0), 1);
     }
 
     #[test]

@@ -52,7 +52,7 @@ fn of_end(report: &Report<'_>) -> Option<(bool, String)> {
         return None;
     }
     let why = report.clock.notes.iter().rev().find_map(|note| note.text.strip_prefix(ENDED));
-    let why = why.map_or("Ended".to_owned(), |why| {
+    let why = why.map_or("The recording ends".to_owned(), |why| {
         let mut letters = why.chars();
         let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
         escape(&format!("{first}{}", letters.as_str()))

@@ -12,15 +12,17 @@ const WHOLE_MODELS: [&str; 2] = ["network.loss.bernoulli.probability", "network.
 /// Which key cannot be reached, and why.
 pub fn changed(text: &str, changes: &[(&str, &Value)]) -> Result<String, String> {
     let mut root: Table = text.parse().map_err(|error: toml::de::Error| error.message().to_string())?;
+    // Before anything is set, so that no other change is lost with it.
+    for (key, _) in changes.iter().filter(|(key, _)| WHOLE_MODELS.contains(key)) {
+        let mut steps = key.split('.');
+        let section = steps.next().and_then(|section| root.get_mut(section)?.as_table_mut());
+        if let (Some(section), Some(model)) = (section, steps.next()) {
+            section.remove(model);
+        }
+    }
     for (key, value) in changes {
         let mut steps: Vec<&str> = key.split('.').collect();
         let last = steps.pop().unwrap_or(key);
-        if WHOLE_MODELS.contains(key)
-            && let [section, model, _] = steps[..]
-            && let Some(section) = root.get_mut(section).and_then(Value::as_table_mut)
-        {
-            section.remove(model);
-        }
         let mut here = &mut root;
         for (depth, step) in steps.iter().enumerate() {
             let allowed = list_at(here, step);
@@ -128,12 +130,17 @@ mod tests {
         let mission = Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}"));
         assert_eq!(mission.links[0].fixed_delay().map(|delay| delay.secs()), Some(0.5));
         assert!(format!("{:?}", mission.links[0].layers[0].loss).contains("Bernoulli(0.25)"), "{:?}", mission.links[0]);
+        // Who sets both says two things.
+        let gap = Value::from(5.0);
+        let both = changed(&bursts, &[("network.loss.gilbert_elliott.mean_gap", &gap), changes[0]]).expect("changed");
+        let faults = Mission::parse("m.toml", &both).expect_err("two models").to_string();
+        assert!(faults.contains("network.loss: found bernoulli, gilbert_elliott"), "{faults}");
     }
 
     #[test]
     fn what_a_mission_chose_is_the_one_name_there() {
         assert_eq!(chosen(MISSION, "coordination.law").as_deref(), Some("introduction"));
-        assert_eq!((chosen(MISSION, "network"), chosen(MISSION, "vehicles[0].path.nothing")), (None, None));
+        assert_eq!((chosen(MISSION, "coordination"), chosen(MISSION, "vehicles[0].path.nothing")), (None, None));
     }
 
     #[test]

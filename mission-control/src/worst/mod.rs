@@ -332,6 +332,11 @@ mod tests {
             worst(&mission(&late), &quest, "late.toml", &folder.path().join("late.toml"), |_| {}).expect("found");
         assert_eq!((found.bound, found.guaranteed_rate), (None, None));
         assert!(found.no_bound.is_some_and(|reason| reason.contains("they take 1.000 s")));
+        // What is too short for messages is that alone: windows of T₀ see the fleet connected, so T is bounded.
+        let quest = Quest { allowance: allowance(0.5, 5.0, 1.0), ..quest };
+        let found = worst(&mission(BRIEF_LOSSES), &quest, "m.toml", &folder.path().join("m.toml"), |_| {});
+        let reason = found.expect("found").no_bound.expect("none");
+        assert!(reason.contains("age of news") && !reason.contains("unbounded"), "{reason}");
     }
 
     #[test]

@@ -88,6 +88,8 @@ pub struct Emulator {
     /// Which links were last recorded as up: those of the signal whose two ends are present.
     recorded_up: Vec<bool>,
     next_change: Option<Time>,
+    /// Whether what is caught up with happened while the emulator was not let run.
+    asleep: bool,
     under_way: Agenda,
     /// Number of the newest message taken from each vehicle, to tell a repetition.
     newest: Vec<Option<u32>>,
@@ -132,6 +134,7 @@ impl Emulator {
             present: vec![true; n],
             recorded_up: vec![false; mission.links.len()],
             next_change: Some(Time::ZERO),
+            asleep: false,
             under_way: Agenda::default(),
             newest: vec![None; n],
             said: vec![None; n],
@@ -165,6 +168,15 @@ impl Emulator {
         }
         self.recorded_up.fill(false);
         self.record_links(back, false);
+    }
+
+    /// The emulator itself was not let run from `gone` until the present, `back`: what was to arrive meanwhile found every link
+    /// down, and what is said from now on finds them as planned.
+    pub fn slept(&mut self, gone: Time, back: Time) {
+        self.asleep = true;
+        self.catch_up(back, back);
+        self.asleep = false;
+        self.was_away(gone, back);
     }
 
     /// In real time a vehicle's process comes and goes: while there is none, nobody hears what is sent to it, and its links
@@ -281,7 +293,7 @@ impl Emulator {
         let to = self.links[message.link].to;
         let spoilt = message.reception.and_then(|place| self.airs[to].leave(place));
         let arrived = if message.corrupt { Fate::Corrupt } else { Fate::Delivered };
-        let fate = match (self.up[message.link], self.present[to]) {
+        let fate = match (self.up[message.link] && !self.asleep, self.present[to]) {
             (false, _) => Fate::LinkDown,
             (true, false) => Fate::ReceiverAbsent,
             (true, true) => spoilt.unwrap_or(arrived),
@@ -349,7 +361,7 @@ impl Emulator {
     fn catch_up(&mut self, now: Time, until: Time) {
         while let Some(next) = self.poll_timeout().filter(|next| *next <= until) {
             if self.next_change.is_some_and(|change| change <= next) {
-                self.change(next, true);
+                self.change(next, !self.asleep);
             } else if let Some((start, vehicle)) = self.next_speaker().filter(|(start, _)| *start <= next) {
                 self.speak(start, vehicle);
             } else if let Some(message) = self.under_way.pop() {

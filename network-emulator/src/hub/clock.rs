@@ -6,7 +6,7 @@ use common::record::{Record, Row, SpeedRow};
 use common::time::Time;
 use common::wire::vehicle::{ClockPlan, Phase, SpeedCommand, ToVehicle};
 
-use super::{Hub, HubOutput, LATEST_BEGIN_S};
+use super::{ASLEEP, ASLEEP_S, Hub, HubOutput, LATEST_BEGIN_S};
 use crate::emulator::{Channel, Emulator, Sent};
 use crate::lockstep::Lockstep;
 
@@ -26,6 +26,7 @@ impl Hub {
         let real = speed_up.is_some();
         load.phase = Phase::Running;
         load.clock = Some(clock);
+        load.awake = now;
         load.emulator = Emulator::new(load.mission.clone(), speed_up);
         let absent = (0..load.seats.len()).filter(|vehicle| {
             !self.vehicles.get(&load.mission.vehicles[*vehicle].id).is_some_and(|known| known.connected)
@@ -71,6 +72,25 @@ impl Hub {
         self.record_speeds(&known);
         self.drain_emulator();
         self.note(now, &format!("the emulator came back at {now}; every link was down from {gone} on"));
+    }
+
+    /// A hub that was not let run (its process was stopped, or its machine too busy) finds that out here: nothing went from
+    /// vehicle to vehicle meanwhile, and the record must not say otherwise.
+    pub(super) fn look_at_the_clock(&mut self, now: Time) {
+        let Some((load, speed_up)) = self.load.as_mut().and_then(|load| load.speed_up().map(|s| (load, s))) else {
+            return;
+        };
+        let before = load.awake;
+        load.awake = before.max(now);
+        let (gone, back) = (before.max(Time::ZERO), now.min(load.mission.end));
+        if (now - before).secs() <= ASLEEP_S * speed_up || back <= gone {
+            return;
+        }
+        load.emulator.slept(gone, back);
+        self.drain_emulator();
+        let text = format!("{ASLEEP} from {gone} to {back}; every link was down meanwhile");
+        self.note(back, &text);
+        self.say(text);
     }
 
     pub(super) fn record_speeds(&mut self, commands: &[SpeedCommand]) {

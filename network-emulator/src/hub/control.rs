@@ -134,6 +134,7 @@ impl Hub {
             adopted,
             collected: false,
             counted_from: Time::ZERO,
+            awake: Time::ZERO,
             now: Time::ZERO,
         });
         self.take_seats();

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use common::machine::Machine;
 use common::mission::{Mission, SharedMission};
 use common::record::{Row, Settled};
-use common::time::Time;
+use common::time::{Span, Time};
 use common::wire::fleet::{FromFleet, Pace, ToFleet};
 use common::wire::vehicle::{ClockPlan, FromVehicle, LogPiece, Phase, SpeedCommand, ToVehicle};
 
@@ -31,6 +31,9 @@ pub const HUB: &str = "network-emulator";
 /// The note with which a flight ends before its time begins with this; what follows is why.
 pub const ENDED: &str = "flight ended: ";
 
+/// The note about a time in which the emulator carried nothing although it was there begins with this.
+pub const ASLEEP: &str = "the emulator was not let run";
+
 /// A speed commanded now holds from this much later, so that every vehicle has it in time \[s of wall clock\].
 const SPEED_LEAD_S: f64 = 0.25;
 
@@ -38,6 +41,11 @@ const SPEED_LEAD_S: f64 = 0.25;
 const MOST_SPEEDS: usize = 10_000;
 /// Greatest formation speed that can be commanded, either way: the greatest of a mission file \[units of xi per s\].
 const FASTEST: f64 = 1e6;
+
+/// How often the hub looks at the clock of a real flight if nothing happens \[s of wall clock\].
+const BEAT_S: f64 = 0.25;
+/// A hub that has not looked at the clock for longer than this was not let run \[s of wall clock\].
+const ASLEEP_S: f64 = BEAT_S + 1.0;
 
 /// A flight that is taken up from a vehicle does not begin later than this much from now \[s of wall clock\].
 const LATEST_BEGIN_S: f64 = 60.0;
@@ -172,7 +180,19 @@ struct Load {
     collected: bool,
     /// From when on messages are counted.
     counted_from: Time,
+    /// When the hub last looked at the clock.
+    awake: Time,
     now: Time,
+}
+
+impl Load {
+    /// The flight is under way on a real clock; mission seconds per second of wall clock.
+    fn speed_up(&self) -> Option<f64> {
+        match self.clock {
+            Some(ClockPlan::Real { speed_up, .. }) if self.phase == Phase::Running => Some(speed_up),
+            _ => None,
+        }
+    }
 }
 
 impl Default for Hub {
@@ -253,6 +273,7 @@ impl Machine for Hub {
     type Output = HubOutput;
 
     fn handle(&mut self, now: Time, input: Option<HubInput>) {
+        self.look_at_the_clock(now);
         match input {
             Some(HubInput::Joined { id, seat }) => self.joined(now, id, seat),
             Some(HubInput::Left(id)) => self.left(now, &id),
@@ -295,8 +316,10 @@ impl Machine for Hub {
     }
 
     fn poll_timeout(&self) -> Option<Time> {
-        let load = self.load.as_ref().filter(|l| l.phase == Phase::Running && l.lockstep.is_none())?;
-        Some(load.emulator.poll_timeout().map_or(load.mission.end, |at| at.min(load.mission.end)))
+        let load = self.load.as_ref()?;
+        let beat = load.awake + Span::from_secs(BEAT_S * load.speed_up()?);
+        let next = load.mission.end.min(beat);
+        Some(load.emulator.poll_timeout().map_or(next, |at| at.min(next)))
     }
 }
 

@@ -37,6 +37,14 @@ fn told<'o>(outputs: &'o [HubOutput], id: &str) -> Vec<&'o ToVehicle> {
     outputs.iter().filter_map(to).collect()
 }
 
+/// Lets time pass: the hub is called whenever it wants to be.
+fn pass(hub: &mut Hub, until_s: f64) {
+    while let Some(at) = hub.poll_timeout().filter(|at| at.secs() < until_s) {
+        hub.handle(at, None);
+    }
+    hub.handle(Time::from_secs(until_s), None);
+}
+
 fn joined(id: &str) -> HubInput {
     HubInput::Joined { id: id.into(), seat: IDS.iter().position(|known| *known == id).expect("of the mission") }
 }
@@ -129,6 +137,21 @@ fn a_stepped_run_needs_every_vehicle() {
     hub.handle(Time::ZERO, Some(HubInput::Left("auv1".into())));
     assert_eq!(hub.phase(), Phase::Aborted);
     assert!(told(&outputs(&mut hub), "auv2").contains(&&ToVehicle::Stop));
+}
+
+/// Its last word never came, for it had no line. That is no reason to say that it gave none.
+#[test]
+fn who_lost_the_line_in_a_stepped_run_comes_back_with_the_reason() {
+    let mut hub = flying(Pace::Stepped, ClockPlan::Stepped);
+    IDS.iter().for_each(|id| hub.handle(Time::ZERO, Some(HubInput::Left((*id).into()))));
+    let flight = FlightPlan { mission: HELIX.into(), clock: ClockPlan::Stepped, speeds: vec![] };
+    join(&mut hub, "auv2", Phase::Aborted, Some(flight));
+    let answers = ask(&mut hub, Time::ZERO, ToFleet::Status);
+    let reason = answers.iter().find_map(|output| match output {
+        HubOutput::ToControl { message: FromFleet::Status(status), .. } => Some(status.vehicles[1].reason.as_str()),
+        _ => None,
+    });
+    assert_eq!(reason, Some("it lost the line to the network-emulator in a stepped run"));
 }
 
 #[test]
@@ -337,9 +360,10 @@ fn the_channel_knows_who_has_left_and_who_is_back() {
     let say = |hub: &mut Hub, at: f64, seq: u32| {
         let state =
             CoordinationState { mission: digest(HELIX), sender: 0, seq, made: Time::ZERO, xi: 1.0, scalar: None };
+        pass(hub, at);
         hub.handle(Time::from_secs(at), Some(HubInput::State(0, state.encode().into())));
         // 5 s of delay; the link is up for the last 2.5 s of every 10 s.
-        hub.handle(Time::from_secs(at + 5.0), None);
+        pass(hub, at + 5.0);
         outputs(hub).into_iter().find_map(|output| match output {
             HubOutput::Settled(settled) => Some(settled.fate),
             HubOutput::Deliver { settled, seat: 1, .. } => settled.map(|settled| settled.fate),
@@ -347,9 +371,11 @@ fn the_channel_knows_who_has_left_and_who_is_back() {
         })
     };
     assert_eq!(say(&mut hub, 3.0, 30), Some(Fate::Delivered));
+    pass(&mut hub, 9.0);
     hub.handle(Time::from_secs(9.0), Some(HubInput::Left("auv2".into())));
     assert_eq!(say(&mut hub, 13.0, 130), Some(Fate::ReceiverAbsent));
     assert_eq!(say(&mut hub, 19.0, 190), Some(Fate::LinkDown), "the link would not have carried it either");
+    pass(&mut hub, 25.0);
     hub.handle(Time::from_secs(25.0), Some(joined("auv2")));
     assert_eq!(say(&mut hub, 33.0, 330), Some(Fate::Delivered));
 }
@@ -431,4 +457,53 @@ fn a_vehicle_that_comes_back_is_heard_whatever_was_said_in_its_name() {
     hub.handle(Time::from_secs(3.0), Some(HubInput::Left("auv1".into())));
     hub.handle(Time::from_secs(4.0), Some(joined("auv1")));
     assert!(say(&mut hub, 5.0, 50));
+}
+
+/// Its process was stopped for half a minute: the record must not tell of a network that was not there.
+#[test]
+fn a_hub_that_was_not_let_run_records_that_every_link_was_down() {
+    use common::record::{Fate, Record};
+
+    for (speed_up, wakes_s) in [(1.0, 38.0), (10.0, 38.0), (1000.0, 38.0)] {
+        let clock = ClockPlan::Real { epoch_unix_ns: 0, speed_up };
+        let mut hub = flying(Pace::Real { speed_up }, clock);
+        let state =
+            CoordinationState { mission: digest(HELIX), sender: 0, seq: 30, made: Time::ZERO, xi: 1.0, scalar: None };
+        pass(&mut hub, 3.0);
+        hub.handle(Time::from_secs(3.0), Some(HubInput::State(0, state.encode().into())));
+        pass(&mut hub, 5.0);
+        outputs(&mut hub);
+        // A message is due at 8 s, and the links are up for the last 2.5 s of every 10 s.
+        hub.handle(Time::from_secs(wakes_s), None);
+        let said = outputs(&mut hub);
+        let fates = |said: &[HubOutput]| -> Vec<Fate> {
+            let fate = |output: &HubOutput| match output {
+                HubOutput::Settled(settled) => Some(settled.fate),
+                HubOutput::Deliver { settled, .. } => settled.map(|settled| settled.fate),
+                _ => None,
+            };
+            said.iter().filter_map(fate).collect()
+        };
+        if speed_up == 1000.0 {
+            assert!(!fates(&said).contains(&Fate::LinkDown), "33 ms of wall clock are no sleep: {said:?}");
+            assert!(notes(&said).is_empty(), "{said:?}");
+            continue;
+        }
+        assert!(!fates(&said).is_empty() && fates(&said).iter().all(|fate| *fate == Fate::LinkDown), "{said:?}");
+        assert!(!said.iter().any(|output| matches!(output, HubOutput::Deliver { .. })), "{said:?}");
+        let change = |record: &Record| match record {
+            Record::Topology(row) => Some((row.t_ns / 1_000_000_000, row.up)),
+            _ => None,
+        };
+        let changes: Vec<_> = recorded(&said).into_iter().filter_map(change).collect();
+        assert_eq!(changes, [[(5, false); 4], [(38, true); 4]].concat());
+        assert_eq!(
+            notes(&said),
+            ["the emulator was not let run from 5.000 s to 38.000 s; every link was down meanwhile"]
+        );
+        // From here on the network is as planned.
+        pass(&mut hub, 43.0);
+        let changes: Vec<_> = recorded(&outputs(&mut hub)).into_iter().filter_map(change).collect();
+        assert_eq!(changes, [(40, false); 4]);
+    }
 }

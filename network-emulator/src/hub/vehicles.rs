@@ -9,6 +9,9 @@ use common::wire::vehicle::{ClockPlan, FlightPlan, FromVehicle, Phase, SpeedComm
 
 use super::{Hub, HubOutput, Known, Load, MOST_SPEEDS};
 
+/// Why a vehicle ended a stepped run that comes back from it without having told.
+const LINE_LOST: &str = "it lost the line to the network-emulator in a stepped run";
+
 impl Hub {
     pub(super) fn joined(&mut self, now: Time, id: String, seat: usize) {
         let known = self.vehicles.entry(id.clone()).or_insert(Known {
@@ -123,8 +126,13 @@ impl Hub {
 
     pub(super) fn hello(&mut self, id: &str, phase: Phase, flight: Option<FlightPlan>) {
         let same = |load: &Load, flight: &FlightPlan| load.mission.digest == digest(&flight.mission);
+        let stopped = self.load.as_ref().is_some_and(|load| load.phase == Phase::Aborted && load.lockstep.is_some());
         if let Some(known) = self.vehicles.get_mut(id) {
             known.phase = phase;
+            // Its line went down, and with that its last word was lost.
+            if stopped && phase == Phase::Aborted && known.reason.is_empty() {
+                known.reason = LINE_LOST.to_string();
+            }
         }
         match (&self.load, flight) {
             (None, Some(flight)) => self.adopt(id, phase, flight),
