@@ -83,16 +83,16 @@ enum What {
     /// Fly a mission with every combination of some values, each several times, and sum up what came of it
     #[command(
         after_help = "Example:\n  mission-control sweep tests/missions/loss-delay.toml --set network.loss.bernoulli.probability=0:0.8:0.2 --repeat 6\n\n\
-        Two laws under the same losses:\n  mission-control sweep tests/missions/loss-delay.toml --paired --repeat 6 --set network.loss=0:0.8:0.2 \\\n    \
-        --set 'coordination.law={ switching = { gain = 0.15 } },{ delayed = { gain = 0.15, delay_s = 0.0 } }'\n\n\
+        Two laws under the same losses:\n  mission-control sweep tests/missions/loss-delay.toml --paired --repeat 6 \\\n    --set network.loss=0:0.8:0.2 \\\n    \
+        --set 'coordination.law={ switching.gain = 0.15 },{ delayed = { gain = 0.15, delay_s = 0 } }'\n\n\
         A key of one vehicle, and of an item of a list:\n  --set vehicles.v1.start.x_m=3,4   --set 'vehicles[0].start.x_m=3,4'\n\nExit codes: 0 all runs are there, 1 interrupted, 2 a wrong mission or key, or a folder with runs that this sweep would lose,\n  4 files cannot be read or written."
     )]
     Sweep {
         /// The mission file
         mission: PathBuf,
         /// A key of the mission file with its values: KEY=FROM:TO:STEP or KEY=VALUE,VALUE; may be repeated. For short:
-        /// network.loss and network.delay for independent losses and a constant delay in place of the mission's models, and
-        /// coordination.GAIN for a gain of the mission's law, vehicles.ID.KEY for vehicles[N].KEY
+        /// network.loss and network.delay for independent losses and a constant delay in place of the mission's models,
+        /// coordination.GAIN for a gain of the mission's law, and vehicles.ID.KEY for vehicles[N].KEY
         #[arg(long = "set", value_name = "KEY=VALUES", required = true)]
         sets: Vec<String>,
         /// Runs of every combination, each with a seed of its own. The 95 % interval of a median needs six
