@@ -6,6 +6,7 @@
 //! | `trajectories.svg` (in space) | (a) from above (b) third coordinate over time | Figure 4.2 |
 //! | `errors.svg` (in space) | (a) path-following errors (b) coordination errors, outages shaded | Figure 4.3 |
 //! | `rate.svg` | the norm of the coordination error, logarithmic, with the fitted and the guaranteed rate | |
+//! | `links.svg` | when each directed link was up, if any ever was not | |
 
 use std::ops::Range;
 
@@ -22,6 +23,7 @@ use super::drawing::{
 use super::html::number;
 use super::network::Network;
 use super::series::{Coordination, Track, tracks, unbroken};
+use super::signal;
 use super::statistics::thinned;
 
 /// One figure.
@@ -39,11 +41,13 @@ pub struct Figure {
 pub fn figures(recording: &Recording, facts: &Facts) -> Vec<Figure> {
     let tracks = tracks(&recording.exact, facts);
     let coordination = Coordination::of(&tracks, facts);
-    let outages = Network::of(&recording.exact, facts).blackouts();
+    let network = Network::of(&recording.exact, facts);
+    let outages = network.blackouts();
     let decay = Decay::of(&coordination, &recording.exact, facts);
     let view = View { facts, tracks, coordination, decay, outages };
     let mut figures = if facts.spatial { view.spatial() } else { view.planar() };
     figures.extend(view.rate());
+    figures.extend(signal::figure(&network, facts));
     figures
 }
 
@@ -307,8 +311,8 @@ mod tests {
     #[test]
     fn planar_and_spatial_fleets_have_the_figures_of_the_thesis() {
         let names = |spatial| figures(&fleet(spatial), &facts(spatial)).into_iter().map(|f| f.name).collect::<Vec<_>>();
-        assert_eq!(names(false), ["run", "rate"]);
-        assert_eq!(names(true), ["trajectories", "errors", "rate"]);
+        assert_eq!(names(false), ["run", "rate", "links"]);
+        assert_eq!(names(true), ["trajectories", "errors", "rate", "links"]);
     }
 
     /// A forged row, or one of a vehicle that flew out of all numbers: the length of an axis that holds it is none.
@@ -366,11 +370,15 @@ mod tests {
         numbers.filter_map(|number| number.parse().ok()).collect()
     }
 
+    fn named(name: &str, recording: &Recording, facts: &Facts) -> Figure {
+        figures(recording, facts).into_iter().find(|figure| figure.name == name).expect("drawn")
+    }
+
     #[test]
     fn the_rate_in_the_figure_is_that_of_the_summary() {
         for recording in [fleet(true), changing()] {
             let fit = summarise(&recording, &facts(true)).fleet.coordination.fit.expect("decays");
-            let drawn = figures(&recording, &facts(true)).pop().expect("drawn");
+            let drawn = named("rate", &recording, &facts(true));
             assert!(drawn.svg.contains(&format!("fitted: {} /s", number(fit.rate))), "{fit:?}");
             let part = format!("(dashed: fitted from {} s to {} s)", number(fit.from_s), number(fit.to_s));
             assert!(drawn.caption.contains(&part), "{part} / {}", drawn.caption);
@@ -385,7 +393,7 @@ mod tests {
     fn the_promise_is_drawn_from_the_last_change_of_speed_on() {
         let start = |recording: &Recording, guaranteed_factor| {
             let facts = Facts { guaranteed_factor, ..facts(true) };
-            let drawn = figures(recording, &facts).pop().expect("drawn").svg;
+            let drawn = named("rate", recording, &facts).svg;
             ends_of(&drawn, PLANNED, "stroke-dasharray")[0]
         };
         let (whole, changed) = (start(&fleet(true), Some(1.3)), start(&changing(), Some(1.3)));

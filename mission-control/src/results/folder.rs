@@ -159,7 +159,7 @@ mod tests {
         let first = files(directory.path());
         let names: Vec<_> = first.iter().map(|(name, _)| name.to_string_lossy().into_owned()).collect();
         assert_eq!(names, ["clock.json", "report.html", "summary.json", "theory.json"]);
-        assert_eq!(files(&directory.path().join("figures")).len(), 3);
+        assert_eq!(files(&directory.path().join("figures")).len(), 4);
         write_fleet(directory.path(), true);
         assert!(files(directory.path()) == first, "the same recording gives the same files");
     }

@@ -30,6 +30,7 @@ pub(crate) mod network;
 mod punctuality;
 mod report;
 mod series;
+mod signal;
 pub(crate) mod statistics;
 mod summary;
 #[cfg(test)]

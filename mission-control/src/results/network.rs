@@ -109,6 +109,11 @@ impl Network {
         down
     }
 
+    /// When a link was up, as intervals (from, to) \[s\].
+    pub fn up_times(&self, from: &str, to: &str) -> Vec<(f64, f64)> {
+        complement(&self.down_times(from, to), 0.0, self.end.secs())
+    }
+
     /// When every link was down, as intervals \[s\].
     pub fn blackouts(&self) -> Vec<(f64, f64)> {
         let mut common: Option<Vec<(f64, f64)>> = None;

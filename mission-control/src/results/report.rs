@@ -431,7 +431,7 @@ mod tests {
             assert!(!page.contains(forbidden), "{forbidden}");
         }
         assert!(page.len() < 600_000, "{} bytes", page.len());
-        assert_eq!(page.matches("<svg").count(), 3);
+        assert_eq!(page.matches("<svg").count(), 4);
     }
 
     #[test]
