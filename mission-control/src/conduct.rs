@@ -17,6 +17,8 @@ use crate::missing::how_to_bring;
 
 /// Between two questions after the fleet's status.
 const POLL: Span = Span::from_nanos(200_000_000);
+/// Why a run ended that was interrupted while the fleet was not flying yet, whether or not it had answered.
+pub const INTERRUPTED: &str = "interrupted before the start";
 /// Why a log is missing that there never was.
 const NO_LOG: &str = "it has no log of this mission";
 /// A piece of a log that has not come after this long is asked for again.
@@ -418,7 +420,7 @@ impl Machine for Conduct {
             Some(ConductInput::Interrupt) => match self.step {
                 Step::Starting | Step::Flying => self.send(ToFleet::Stop),
                 Step::Collecting | Step::Ended => {}
-                Step::Contact | Step::Arming => self.fail("interrupted before the start".to_string()),
+                Step::Contact | Step::Arming => self.fail(INTERRUPTED.to_string()),
             },
             None => self.poll(now),
         }

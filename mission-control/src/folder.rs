@@ -497,17 +497,6 @@ mod tests {
     }
 
     #[test]
-    fn logs_are_spoken_of_where_there_are_some() {
-        let ground = tempfile::tempdir().expect("a folder");
-        let logs = ground.path().join("logs/0123");
-        fs::create_dir_all(&logs).expect("makes");
-        let said = || recording(ground.path()).expect_err("there is none");
-        assert!(!said().contains("makes it of the logs"), "{}", said());
-        fs::write(logs.join("auv1.mcap"), "").expect("writes");
-        assert!(said().contains("makes it of the logs"), "{}", said());
-    }
-
-    #[test]
     fn the_stamp_is_the_civil_date() {
         let at = |seconds| utc_stamp(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds));
         assert_eq!(at(0), "1970-01-01-000000");

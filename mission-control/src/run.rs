@@ -21,7 +21,7 @@ use common::wire::{self, GarbageCount};
 use network_emulator::hub::COLLECTOR;
 
 use crate::brought::of_one_flight;
-use crate::conduct::{Conduct, ConductInput, ConductOutput, Landing, Step};
+use crate::conduct::{Conduct, ConductInput, ConductOutput, INTERRUPTED, Landing, Step};
 use crate::console::Progress;
 use crate::folder::{self, HostFacts, RECORDING};
 use crate::missing;
@@ -30,9 +30,6 @@ use crate::results::{ClockSummary, Summary};
 
 /// How long own processes may take to come up.
 const OWN_PATIENCE: Duration = Duration::from_secs(60);
-
-/// Why a run ended whose fleet had not answered yet.
-const INTERRUPTED: &str = "interrupted before the flight";
 
 /// How a flight shall be flown.
 pub struct Plan {

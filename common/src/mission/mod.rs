@@ -17,6 +17,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
 
+pub use check::FASTEST_FORMATION;
 pub use fault::{Collector, Fault, Faults};
 pub use link::{Layer, Link};
 pub use pattern::{Pattern, PatternMotion, PatternPoint};

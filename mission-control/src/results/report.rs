@@ -478,7 +478,9 @@ mod tests {
     #[test]
     fn a_condition_that_does_not_hold_asks_for_attention() {
         let page = page(false, &[TheoryRow { holds: Some(false), ..TheoryRow::default() }]);
-        assert!(page.contains("verdict attention") && page.contains("1 condition of the theory does not hold"));
+        assert!(
+            page.contains("verdict attention") && page.contains("1 statement of the theory does not cover this flight")
+        );
     }
 
     #[test]

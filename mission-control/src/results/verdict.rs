@@ -147,11 +147,11 @@ fn of_paths(summary: &Summary, facts: &Facts, flown: usize) -> (bool, String) {
     (as_predicted.is_some(), format!("The largest path-following error at the end was {end} m{by_design}."))
 }
 
-/// Conditions that do not hold, if any.
+/// Statements whose premises are not met, if any: that is no failure of the fleet, but nothing is promised then.
 fn of_conditions(theory: &[TheoryRow]) -> Option<(bool, String)> {
     let failed = theory.iter().filter(|row| row.holds == Some(false)).count();
-    let (noun, verb) = if failed == 1 { ("condition", "does") } else { ("conditions", "do") };
-    (failed > 0).then(|| (false, format!("{failed} {noun} of the theory {verb} not hold for this mission.")))
+    let (noun, verb) = if failed == 1 { ("statement", "does") } else { ("statements", "do") };
+    (failed > 0).then(|| (false, format!("{failed} {noun} of the theory {verb} not cover this flight.")))
 }
 
 /// A guaranteed rate that was not reached, if one was not.

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use common::mission::Mission;
+use common::mission::{FASTEST_FORMATION, Mission};
 use common::record::{ClockRecord, NoteRow, Row};
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
 
-use super::{COLLECTOR, ENDED, FASTEST, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
+use super::{COLLECTOR, ENDED, HUB, Hub, HubOutput, Known, Load, MOST_SPEEDS, SPEED_LEAD_S};
 use crate::emulator::Emulator;
 
 impl Hub {
@@ -174,7 +174,7 @@ impl Hub {
     }
 
     pub(super) fn speed(&mut self, now: Time, speed: f64) {
-        if speed.is_nan() || speed.abs() > FASTEST {
+        if speed.is_nan() || speed.abs() > FASTEST_FORMATION {
             let allowed = "-1000000 to 1000000 units of xi per s, as in a mission file";
             return self.refuse(format!("found a formation speed of {speed:?}; allowed: {allowed}"));
         }

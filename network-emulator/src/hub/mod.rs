@@ -39,9 +39,6 @@ const SPEED_LEAD_S: f64 = 0.25;
 
 /// Most speeds that are commanded in a flight: one a second for nearly three hours.
 const MOST_SPEEDS: usize = 10_000;
-/// Greatest formation speed that can be commanded, either way: the greatest of a mission file \[units of xi per s\].
-const FASTEST: f64 = 1e6;
-
 /// How often the hub looks at the clock of a real flight if nothing happens \[s of wall clock\].
 const BEAT_S: f64 = 0.25;
 /// A hub that has not looked at the clock for longer than this was not let run \[s of wall clock\].

@@ -29,7 +29,7 @@ pub(super) const MOST_VEHICLES: usize = 256;
 pub(super) const LONGEST: f64 = 30.0 * 86_400.0;
 
 /// Greatest formation speed \[units of ξ per s\].
-pub(super) const FASTEST: f64 = 1e6;
+pub const FASTEST_FORMATION: f64 = 1e6;
 
 /// Farthest place from the origin \[m\]: a quarter of the way round the globe. Beyond it a number is a slip of the pen, and
 /// squares and differences lose their digits.

@@ -3,7 +3,7 @@
 use super::super::SpeedProfile;
 use super::super::fault::{Collector, plain};
 use super::super::file::{MissionFile, SpeedStep};
-use super::{FASTEST, LONGEST};
+use super::{FASTEST_FORMATION, LONGEST};
 use crate::time::{Span, Time};
 use crate::wire::vehicle::SpeedCommand;
 
@@ -59,14 +59,19 @@ pub(super) fn check_times(faults: &mut Collector<'_>, file: &MissionFile) -> Opt
 pub(super) fn check_formation(faults: &mut Collector<'_>, file: &MissionFile) -> Option<SpeedProfile> {
     match (&file.formation.speed, &file.formation.profile) {
         (Some(speed), None) => {
-            faults.number("formation.speed", *speed, speed.abs() <= FASTEST, "-1000000 to 1000000 units of xi per s");
+            faults.number(
+                "formation.speed",
+                *speed,
+                speed.abs() <= FASTEST_FORMATION,
+                "-1000000 to 1000000 units of xi per s",
+            );
             Some(SpeedProfile::new(vec![SpeedCommand { at: Time::ZERO, speed: *speed }]))
         }
         (None, Some(steps)) => {
             let mut before = f64::NEG_INFINITY;
             for (i, step) in steps.iter().enumerate() {
                 let key = format!("formation.profile[{i}]");
-                let ok = step.speed.abs() <= FASTEST;
+                let ok = step.speed.abs() <= FASTEST_FORMATION;
                 faults.number(&format!("{key}.speed"), step.speed, ok, "-1000000 to 1000000 units of xi per s");
                 let ok = if i == 0 { step.from_s == 0.0 } else { step.from_s > before && step.from_s <= LONGEST };
                 let allowed = if i == 0 { "0 for the first step" } else { "later than the step before" };
