@@ -184,18 +184,18 @@ fn guarantee_of(case: &Case<'_>) -> Option<Guarantee> {
 /// Conditions and predictions before a flight, for `check`; with the measured values after it.
 pub fn rows(mission: &Mission, summary: Option<&Summary>) -> Vec<TheoryRow> {
     let case = Case::new(mission, summary);
+    let of_the_law = law_rows(&case).into_iter().map(|row| watched::with_everyone(&case, row));
+    let statements: Vec<TheoryRow> = of_the_law.map(|row| case.judged(row)).collect();
     let mut rows = vec![fleet::graph(&case)];
     if mission.vehicles.len() > 1 {
-        let statements: Vec<TheoryRow> = law_rows(&case).into_iter().map(|row| case.judged(row)).collect();
         rows.extend(fleet::spectrum(&case));
         rows.push(fleet::excused(fleet::losses(&case), &statements));
         rows.push(fleet::excused(fleet::connected_in_mean(&case), &statements));
         let together = together::table_3_1(&case, &statements);
-        rows.extend(statements);
+        rows.extend(statements.iter().cloned());
         rows.extend(together);
-        rows.extend(talk::row_of_events(&case));
+        rows.extend(talk::row_of_events(&case).map(|row| watched::with_everyone(&case, row)));
     }
-    let statements = law_rows(&case);
     rows.extend(together::path_following(&case, &statements));
     rows.push(fleet::speed(&case, &statements));
     rows.extend(steady_motion::apart(&case));

@@ -141,6 +141,16 @@ fn not_there(fleet: &FleetSummary) -> Vec<Premise> {
     absent(&fleet.absences).into_iter().chain(unrecorded).chain(gave_up).collect()
 }
 
+/// The row of a statement about the whole fleet: it does not cover a flight in which a vehicle was away.
+pub(super) fn with_everyone(case: &Case<'_>, row: TheoryRow) -> TheoryRow {
+    let away = case.summary.map(|summary| not_there(&summary.fleet)).unwrap_or_default();
+    if away.is_empty() || row.holds != Some(true) {
+        return row;
+    }
+    let found: Vec<String> = away.into_iter().map(|premise| premise.found).collect();
+    TheoryRow { value: format!("{}; {}", row.value, found.join("; ")), holds: Some(false), ..row }
+}
+
 /// Vehicles without a log: what is measured of the fleet's error is that of the others.
 fn unrecorded(fleet: &FleetSummary) -> Vec<&str> {
     let without = fleet.lost.iter().filter(|loss| loss.recorded_until_s.is_none());
@@ -369,6 +379,11 @@ mod tests {
         assert!(row.measured.contains("auv3 is silent from 57.0 s to 120.0 s"), "{}", row.measured);
         assert!(row.measured.contains("judged until 57.0 s alone: covered by Theorem 4.4"), "{}", row.measured);
         assert_eq!((row.holds, guarantee), (Some(false), None));
+        let summary = summarise(&recording, &facts(&mission));
+        let rows = crate::theory::rows(&mission, Some(&summary));
+        let of_law = rows.iter().find(|row| row.name.starts_with("Theorem 4.4")).expect("a row");
+        assert!(of_law.holds == Some(false) && of_law.value.contains("auv3 is silent from 57.0 s"), "{of_law:?}");
+        assert!(of_law.guaranteed_rate.is_none() && of_law.predicted == "–", "{of_law:?}");
     }
 
     #[test]
@@ -387,6 +402,11 @@ mod tests {
         // What is known of the error until then is that of the two others.
         assert!(!row.measured.contains("judged until"), "{}", row.measured);
         assert_eq!((row.holds, guarantee), (Some(false), None));
+        let summary = summarise(&recording, &facts(&mission));
+        let rows = crate::theory::rows(&mission, Some(&summary));
+        let of_law = rows.iter().find(|row| row.name.starts_with("Theorem 4.4")).expect("a row");
+        assert!(of_law.holds == Some(false) && of_law.value.contains("auv3 is silent from 57.0 s"), "{of_law:?}");
+        assert!(of_law.guaranteed_rate.is_none() && of_law.predicted == "–", "{of_law:?}");
         let summary = summarise(&recording, &facts(&mission));
         let rows = super::super::rows(&mission, Some(&summary));
         let bias = rows.iter().find(|row| row.name.starts_with("Along-path bias")).expect("it has δ");
