@@ -27,6 +27,7 @@ pub mod switchboard;
 mod counts;
 mod error;
 mod inbox;
+mod lead;
 mod lobby;
 mod outbox;
 

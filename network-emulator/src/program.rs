@@ -273,6 +273,9 @@ impl Port for HubPort {
     type Event = HubEvent;
     type Exit = ExitCode;
 
+    /// The delays that it emulates are a promise.
+    const PUNCTUAL: bool = true;
+
     fn translate(&mut self, event: HubEvent) -> Option<(Option<Instant>, HubInput)> {
         match event {
             HubEvent::Joined { line, id } => {

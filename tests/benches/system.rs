@@ -76,7 +76,12 @@ fn median(values: Vec<f64>) -> f64 {
 
 /// Processor seconds that this process has used so far.
 fn cpu_seconds() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux");
+    cpu_seconds_of("self")
+}
+
+/// Processor seconds that a process has used so far.
+fn cpu_seconds_of(process: &str) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("Linux");
     let after_name = stat.rsplit(')').next().expect("a stat line");
     let ticks: Vec<f64> = after_name.split_whitespace().skip(11).take(2).filter_map(|t| t.parse().ok()).collect();
     ticks.iter().sum::<f64>() / 100.0
@@ -479,13 +484,17 @@ fn delay_with_everything() {
         vehicles.push(line);
     }
     let speakers = vehicles.len() as u32;
+    let used = || cpu_seconds_of(&emulator.id().to_string());
+    let (begun, before) = (Instant::now(), used());
     for i in paced(4000) {
         let sender = i % speakers;
         let bytes = word(&mission, sender as u16, i / speakers);
         let _ = vehicles[sender as usize].send(Plane::State, &bytes);
     }
+    let share = (used() - before) / begun.elapsed().as_secs_f64();
     std::thread::sleep(Duration::from_secs(2));
     punctuality(EVERYTHING_ON, &mission, &folder);
+    row("of one processor, the emulator used there", &format!("{:.0} %", 100.0 * share));
     let _ = emulator.kill();
     let _ = emulator.wait();
 }

@@ -218,11 +218,10 @@ pub fn worst(
     let length = mission.end - Time::ZERO;
     let allowed = |envelope: &Envelope| initial * quest.hurt.allowed(envelope, length.secs());
     let promise = theory::envelope_over(mission, signals.graphs(), (alpha, t_0, dwell), length);
-    let within = promise.as_ref().ok().map(|(envelope, tolerance)| {
-        let slower = Envelope { rate: envelope.rate * (1.0 - tolerance.slower), ..*envelope };
-        let late = (slower.rate * tolerance.late).exp();
-        worst <= late * allowed(&slower) + tolerance.added
-    });
+    let within = promise
+        .as_ref()
+        .ok()
+        .map(|(envelope, tolerance)| worst <= allowed(&tolerance.of_decay(envelope)) + tolerance.added);
     let envelope = promise.as_ref().ok().map(|(envelope, _)| envelope);
     Ok(Worst {
         initial,

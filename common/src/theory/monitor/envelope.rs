@@ -43,9 +43,15 @@ pub struct Tolerance {
 const ROUNDING: f64 = 1e-9;
 
 impl Tolerance {
+    /// An envelope that decays as much more slowly and begins as much later: from `late` on what is tolerated of the first, but for
+    /// what may be added.
+    pub fn of_decay(&self, envelope: &Envelope) -> Envelope {
+        let rate = envelope.rate * (1.0 - self.slower);
+        Envelope { rate, factor: envelope.factor * (rate * self.late).exp(), ..*envelope }
+    }
+
     /// The most that an error may be at `t` seconds after it was `initial`.
     pub fn allowed(&self, envelope: &Envelope, initial: f64, t: f64) -> f64 {
-        let decayed = (-envelope.rate * (1.0 - self.slower) * (t - self.late).max(0.0)).exp();
-        envelope.factor * decayed * initial * (1.0 + ROUNDING) + self.added
+        self.of_decay(envelope).at(t.max(self.late)) * initial * (1.0 + ROUNDING) + self.added
     }
 }
