@@ -7,35 +7,74 @@ use std::time::{Duration, Instant};
 
 use crate::queue::{Events, Wake};
 
-/// How long before a moment a thread must ask to be woken so as to be awake at it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Lead(Duration);
+/// How long before a moment a thread must ask to be woken so as to be awake at it, and whether it may.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lead {
+    length: Duration,
+    purse: Purse,
+}
 
 impl Lead {
     /// More than this is never spent awake before a deadline: a machine that wakes later still is too busy for it.
     const MOST: Duration = Duration::from_micros(100);
     const STEP: Duration = Duration::from_micros(1);
 
-    /// Waits as [`Events::wait`] does, without patience, and is awake when the deadline comes.
+    /// Nothing is known yet.
+    pub(crate) fn new() -> Lead {
+        Lead { length: Duration::ZERO, purse: Purse { saved: Duration::ZERO, counted: Instant::now() } }
+    }
+
+    /// Waits as [`Events::wait`] does, without patience, and is awake when the deadline comes; in so far as there is time for it.
     pub(crate) fn wait<E>(&mut self, events: &Events<E>, deadline: Instant) -> Wake<()> {
-        let ask = deadline.checked_sub(self.0).unwrap_or(deadline);
-        let sleeps = Instant::now() < ask;
+        let begun = Instant::now();
+        self.purse.earn(begun);
+        if self.purse.saved < Lead::MOST {
+            return events.wait(Some(deadline), false);
+        }
+        let ask = deadline.checked_sub(self.length).unwrap_or(deadline);
         let end = events.wait(Some(ask), false);
         if end != Wake::Deadline {
             return end;
         }
-        if sleeps {
-            self.learn(ask.elapsed());
+        let awake = Instant::now();
+        if begun < ask {
+            self.learn(awake - ask);
         }
-        events.watch(deadline)
+        let end = events.watch(deadline);
+        self.purse.spend(awake.elapsed());
+        end
     }
 
     /// The thread was woken so late. The lead settles where it is enough three times out of four.
     fn learn(&mut self, late: Duration) {
-        self.0 = match late > self.0 {
-            true => (self.0 + 3 * Lead::STEP).min(Lead::MOST),
-            false => self.0.saturating_sub(Lead::STEP),
+        self.length = match late > self.length {
+            true => (self.length + 3 * Lead::STEP).min(Lead::MOST),
+            false => self.length.saturating_sub(Lead::STEP),
         };
+    }
+}
+
+/// Time that may be spent awake: an eighth of what passes, so that thousands of deadlines a second do not take a processor from
+/// the rest of a fleet.
+#[derive(Clone, Copy, Debug)]
+struct Purse {
+    saved: Duration,
+    counted: Instant,
+}
+
+impl Purse {
+    const SHARE: u32 = 8;
+    /// No more is saved up than this.
+    const MOST: Duration = Duration::from_millis(10);
+
+    fn earn(&mut self, now: Instant) {
+        let passed = now.saturating_duration_since(self.counted);
+        self.saved = (self.saved + passed / Purse::SHARE).min(Purse::MOST);
+        self.counted = now;
+    }
+
+    fn spend(&mut self, length: Duration) {
+        self.saved = self.saved.saturating_sub(length);
     }
 }
 
@@ -49,12 +88,14 @@ mod tests {
     #[test]
     fn waiting_with_a_lead_never_ends_early_and_hears_messages() {
         let (feed, events) = queue(9);
-        let mut lead = Lead::default();
-        for micros in [0, 1, 50, 300, 2_000] {
+        let mut lead = Lead::new();
+        // The first have nothing to spend, the last have.
+        for micros in [0, 1, 50, 3_000, 300, 50, 1, 0] {
             let deadline = Instant::now() + Duration::from_micros(micros);
             assert_eq!(lead.wait(&events, deadline), Wake::Deadline);
             assert!(Instant::now() >= deadline);
         }
+        assert!(lead.length > Duration::ZERO, "something was learned");
         feed.lasting(1).expect("room");
         assert_eq!(lead.wait(&events, Instant::now() + Duration::from_secs(600)), Wake::Message(()));
         assert_eq!(events.pop(), Some(1));
@@ -66,7 +107,7 @@ mod tests {
         /// Wake-ups that are late by anything up to a limit: a quarter of them is later than the lead, to a few steps.
         #[test]
         fn a_lead_is_enough_three_times_out_of_four(limit in 12u64..120, seed: u64) {
-            let mut lead = Lead::default();
+            let mut lead = Lead::new();
             let mut number = seed;
             let mut late = || {
                 // A full-period sequence: every lateness is as frequent as the others.
@@ -77,7 +118,7 @@ mod tests {
             let mut enough = 0;
             for _ in 0..4_000 {
                 let late = late();
-                enough += u32::from(late <= lead.0);
+                enough += u32::from(late <= lead.length);
                 lead.learn(late);
             }
             prop_assert!((2_900..3_100).contains(&enough), "{enough} of 4000");
@@ -85,10 +126,29 @@ mod tests {
 
         #[test]
         fn a_busy_machine_is_not_made_busier(late in prop::collection::vec(0u64..1 << 40, 0..400)) {
-            let mut lead = Lead::default();
+            let mut lead = Lead::new();
             for late in late {
                 lead.learn(Duration::from_nanos(late));
-                prop_assert!(lead.0 <= Lead::MOST);
+                prop_assert!(lead.length <= Lead::MOST);
+            }
+        }
+
+        /// However often there are deadlines, and whenever.
+        #[test]
+        fn no_more_than_an_eighth_of_the_time_is_spent(gaps in prop::collection::vec((0u64..2_000, 0u64..=100), 1..2_000)) {
+            let begun = Instant::now();
+            let mut purse = Purse { saved: Duration::ZERO, counted: begun };
+            let (mut now, mut spent) = (begun, Duration::ZERO);
+            for (gap, wanted) in gaps {
+                now += Duration::from_micros(gap);
+                purse.earn(now);
+                if purse.saved >= Lead::MOST {
+                    let length = Duration::from_micros(wanted);
+                    purse.spend(length);
+                    now += length;
+                    spent += length;
+                }
+                prop_assert!(spent * Purse::SHARE <= now - begun);
             }
         }
     }
