@@ -226,7 +226,8 @@ enum What {
         losses; the rest to changes of the worst. What is found is no milder than any that was flown; that there is no\n\
         worse one is not shown.\n\n\
         Example:\n  mission-control worst missions/talk/naive.toml --alpha 0.5 --t0 5 --dwell 1\n\n\
-        Exit codes: 0 found, 2 a wrong mission or number, 4 output cannot be written."
+        Exit codes: 0 found, 1 interrupted (the worst so far is saved), 2 a wrong mission or number, or --out is a file that no search made,\n  \
+        4 output cannot be written."
     )]
     Worst(WorstArgs),
     /// Print the lines of a GeoJSON file as paths in metres, to paste into a mission

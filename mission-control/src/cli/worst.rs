@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
+use bus::console::StopFlag;
 use common::mission::Mission;
 
 use super::mission::load;
@@ -33,7 +34,7 @@ pub(super) struct WorstArgs {
     /// Seed of the search
     #[arg(long, default_value = "1")]
     seed: u64,
-    /// Where the worst mission goes (default: worst-MISSION.toml)
+    /// Where the worst mission goes, in place of an earlier one (default: worst-MISSION.toml)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// JSON for a pipe
@@ -50,8 +51,11 @@ pub(super) fn worst(args: &WorstArgs) -> Ended {
     let quest = quest(args)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("worst-{}.toml", mission.name)));
     let progress = Mutex::new(Progress::new(mission.end));
+    let stop = StopFlag::on_signals();
+    stop.arm();
     let reached = |flown: usize| {
         progress.lock().unwrap_or_else(PoisonError::into_inner).counted("searching", flown, args.flights);
+        !stop.is_raised()
     };
     let source = quoted(args.mission.display().to_string());
     let found = worst::worst(&mission, &quest, &source, &out, reached);
@@ -65,7 +69,10 @@ pub(super) fn worst(args: &WorstArgs) -> Ended {
     } else {
         tell(&mission, &found);
     }
-    Ok(ExitCode::SUCCESS)
+    match found.complete {
+        true => Ok(ExitCode::SUCCESS),
+        false => Err(End(1, format!("interrupted after {} of {} flights", found.flights, args.flights))),
+    }
 }
 
 /// What is looked for, if the numbers given can be.

@@ -2,9 +2,10 @@
 
 mod search;
 
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use common::coordination::disagreement;
 use common::graph::adversary::{Allowance, Signal, Signals};
@@ -85,6 +86,8 @@ pub struct Worst {
     pub no_bound: Option<String>,
     /// How many flights it took.
     pub flights: usize,
+    /// Whether the search came to its end.
+    pub complete: bool,
     /// Where the mission with that signal is.
     pub saved: PathBuf,
 }
@@ -167,10 +170,33 @@ impl From<String> for Unfound {
     }
 }
 
+/// How a saved mission begins.
+const HEAD: &str = "# The worst switching signal found with ";
+
+/// Whether the worst mission can be saved there: in place of an earlier one, but of nothing else.
+fn vacant(out: &Path) -> Result<(), Unfound> {
+    let unwritten = |reason: String| Err(Unfound::Unwritten(format!("cannot write {}: {reason}", out.display())));
+    match std::fs::read(out) {
+        Ok(bytes) if bytes.starts_with(HEAD.as_bytes()) => Ok(()),
+        Ok(_) => Err(Unfound::Refused(format!(
+            "{} is there, and not from an earlier search: it would be lost; name another file with --out",
+            out.display()
+        ))),
+        Err(error) if error.kind() == ErrorKind::NotFound => match out.parent() {
+            Some(folder) if folder != Path::new("") && !folder.is_dir() => {
+                unwritten(format!("there is no folder {}", folder.display()))
+            }
+            _ => Ok(()),
+        },
+        Err(error) => unwritten(error.to_string()),
+    }
+}
+
 /// Searches, on four threads, and saves the mission with the worst signal found as `out`, with what it was found by. `source` is
-/// how the mission is called on the command line.
+/// how the mission is called on the command line. `go_on` is told how many flights are over; the search ends early when it says
+/// so, with the worst found so far.
 ///
-/// The search is a function of the mission, the seed and the number of flights, not of the machine.
+/// A search that comes to its end is a function of the mission, the seed and the number of flights, not of the machine.
 ///
 /// # Errors
 /// What cannot be searched, flown or written.
@@ -178,9 +204,10 @@ pub fn worst(
     mission: &Mission,
     quest: &Quest,
     source: &str,
-    out: &std::path::Path,
-    progress: impl Fn(usize) + Sync,
+    out: &Path,
+    go_on: impl Fn(usize) -> bool + Sync,
 ) -> Result<Worst, Unfound> {
+    vacant(out)?;
     let file: MissionFile = toml::from_str(&mission.text).map_err(|error| error.to_string())?;
     let id = |i: usize| mission.vehicles[i].id.clone();
     let links = mission.links.iter().map(|link| [id(link.from), id(link.to)]).collect();
@@ -194,20 +221,27 @@ pub fn worst(
     let rewriter = Rewriter { file, links, more };
     let written = fly(&mission.text)?;
 
-    let flown = AtomicUsize::new(0);
+    let (flown, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
     let hurts = |signal: &Signal| {
+        if ended.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
         let errors = fly(&rewriter.text(&signals, signal)?)?;
-        progress(flown.fetch_add(1, Ordering::Relaxed) + 1);
-        Ok(errors.hurt(quest.hurt))
+        if !go_on(flown.fetch_add(1, Ordering::Relaxed) + 1) {
+            ended.store(true, Ordering::Relaxed);
+        }
+        Ok(Some(errors.hurt(quest.hurt)))
     };
-    let (worst, signal) = search(&signals, own, quest, hurts)?;
-    let flights = flown.into_inner();
+    let found = search(&signals, own, quest, hurts)?;
+    let (flights, complete) = (flown.into_inner(), !ended.into_inner());
+    let (worst, signal) = found.ok_or_else(|| "no flight was allowed".to_string())?;
     let text = rewriter.text(&signals, &signal)?;
     let Errors { initial, end, .. } = fly(&text)?;
     let hurt = quest.hurt.as_str();
+    let ended = if complete { "" } else { " The search was interrupted then; in full it is:" };
     let head = format!(
-        "# The worst switching signal found with {allowed}:\n# coordination error ({hurt}) {worst:.4e}, at the start {initial:.4e}, \
-         in {flights} flights.\n# mission-control worst {source} --alpha {alpha} --t0 {} --dwell {} --hurt {hurt} --flights {} --seed {}\n",
+        "{HEAD}{allowed}:\n# coordination error ({hurt}) {worst:.4e}, at the start {initial:.4e}, \
+         in {flights} flights.{ended}\n# mission-control worst {source} --alpha {alpha} --t0 {} --dwell {} --hurt {hurt} --flights {} --seed {}\n",
         t_0.secs(),
         dwell.secs(),
         quest.flights,
@@ -235,6 +269,7 @@ pub fn worst(
         guaranteed_rate: envelope.map(|envelope| envelope.rate),
         no_bound: promise.err(),
         flights,
+        complete,
         saved: out.to_path_buf(),
     })
 }
@@ -249,7 +284,7 @@ mod tests {
     use common::graph::measure::Connectivity;
     use common::mission::Mission;
 
-    use super::{Hurt, Quest, allowance, worst};
+    use super::{Hurt, Quest, Unfound, allowance, worst};
 
     const BRIEF_LOSSES: &str = include_str!("../../../missions/brief-losses.toml");
 
@@ -264,7 +299,7 @@ mod tests {
         let quest = Quest { allowance: allowance(0.75, 15.0, 2.5), hurt: Hurt::End, flights: 40, seed: 3 };
         let search = |name: &str| {
             let out = folder.path().join(name);
-            let found = worst(&brief, &quest, "brief.toml", &out, |_| {}).expect("found");
+            let found = worst(&brief, &quest, "brief.toml", &out, |_| true).expect("found");
             (found, std::fs::read_to_string(out).expect("saved"))
         };
         let (found, text) = search("one.toml");
@@ -292,7 +327,40 @@ mod tests {
     fn found(mission: &Mission, (alpha, t_0, dwell): (f64, f64, f64), flights: usize) -> super::Worst {
         let folder = tempfile::tempdir().expect("a folder");
         let quest = Quest { allowance: allowance(alpha, t_0, dwell), hurt: Hurt::End, flights, seed: 1 };
-        worst(mission, &quest, "m.toml", &folder.path().join("m.toml"), |_| {}).expect("found")
+        worst(mission, &quest, "m.toml", &folder.path().join("m.toml"), |_| true).expect("found")
+    }
+
+    #[test]
+    fn a_search_that_is_ended_early_keeps_the_worst_so_far() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let quest = Quest { allowance: allowance(0.75, 7.5, 2.5), hurt: Hurt::End, flights: 40, seed: 1 };
+        let out = folder.path().join("worst.toml");
+        let found = worst(&brief(), &quest, "m.toml", &out, |flown| flown < 5).expect("found");
+        // Flights under way on the other threads come to their end.
+        assert!(!found.complete && (5..9).contains(&found.flights) && found.worst >= found.as_written, "{found:?}");
+        let text = std::fs::read_to_string(&out).expect("saved");
+        assert!(
+            text.contains("The search was interrupted then; in full it is:\n# mission-control worst m.toml"),
+            "{text}"
+        );
+        mission(&text);
+        // The same place serves the whole search.
+        assert!(worst(&brief(), &quest, "m.toml", &out, |_| true).expect("found").complete);
+    }
+
+    #[test]
+    fn what_was_not_found_by_a_search_is_not_written_over() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let own = folder.path().join("own.toml");
+        std::fs::write(&own, BRIEF_LOSSES).expect("written");
+        let quest = Quest { allowance: allowance(0.75, 7.5, 2.5), hurt: Hurt::End, flights: 1, seed: 1 };
+        let search = |out: &std::path::Path| worst(&brief(), &quest, "m.toml", out, |_| true);
+        assert!(matches!(search(&own), Err(Unfound::Refused(reason)) if reason.contains("own.toml is there")));
+        assert_eq!(std::fs::read_to_string(&own).expect("there"), BRIEF_LOSSES);
+        // Told before the search and not after.
+        let nowhere = folder.path().join("nowhere/worst.toml");
+        assert!(matches!(search(&nowhere), Err(Unfound::Unwritten(reason)) if reason.contains("there is no folder")));
+        assert!(matches!(search(folder.path()), Err(Unfound::Unwritten(_))));
     }
 
     #[test]
@@ -328,12 +396,12 @@ mod tests {
         let late = BRIEF_LOSSES.replace("[network]\n", "[network]\ndelay = { constant = { delay_s = 1.0 } }\n");
         let quest = Quest { allowance: allowance(0.5, 5.0, 2.5), hurt: Hurt::Mean, flights: 3, seed: 1 };
         let found =
-            worst(&mission(&late), &quest, "late.toml", &folder.path().join("late.toml"), |_| {}).expect("found");
+            worst(&mission(&late), &quest, "late.toml", &folder.path().join("late.toml"), |_| true).expect("found");
         assert_eq!((found.bound, found.guaranteed_rate), (None, None));
         assert!(found.no_bound.is_some_and(|reason| reason.contains("they take 1.000 s")));
         // What is too short for messages is that alone: windows of T₀ see the fleet connected, so T is bounded.
         let quest = Quest { allowance: allowance(0.5, 5.0, 1.0), ..quest };
-        let found = worst(&mission(BRIEF_LOSSES), &quest, "m.toml", &folder.path().join("m.toml"), |_| {});
+        let found = worst(&mission(BRIEF_LOSSES), &quest, "m.toml", &folder.path().join("m.toml"), |_| true);
         let reason = found.expect("found").no_bound.expect("none");
         assert!(reason.contains("age of news") && !reason.contains("unbounded"), "{reason}");
     }
@@ -347,7 +415,7 @@ mod tests {
         let end = at + EXAMPLE[at..].find('\n').expect("a line");
         let short = format!("{}{duration}40.0{}", &EXAMPLE[..at], &EXAMPLE[end..]);
         let quest = Quest { allowance: allowance(0.5, 5.0, 2.5), hurt: Hurt::Mean, flights: 6, seed: 1 };
-        let found = worst(&mission(&short), &quest, "m.toml", &folder.path().join("m.toml"), |_| {}).expect("found");
+        let found = worst(&mission(&short), &quest, "m.toml", &folder.path().join("m.toml"), |_| true).expect("found");
         assert_eq!(found.statement, Some("Lemma 4.7"));
         assert!(found.bound.is_some_and(|bound| bound > found.worst) && found.within == Some(true), "{found:?}");
     }

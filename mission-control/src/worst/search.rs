@@ -11,7 +11,10 @@ const CHAINS: usize = 4;
 /// So many changes in a row may change nothing.
 const MOST_IDLE: usize = 1000;
 
-/// The signal that hurts most of those that were flown, and how much it hurts.
+/// How much a signal hurts; none if it was not flown, for the search has been ended.
+pub(super) type Hurts = Result<Option<f64>, String>;
+
+/// The signal that hurts most of those that were flown, and how much it hurts; none if none was.
 ///
 /// # Errors
 /// What could not be flown.
@@ -19,11 +22,11 @@ pub(super) fn search(
     signals: &Signals,
     own: Option<Signal>,
     quest: &Quest,
-    hurts: impl Fn(&Signal) -> Result<f64, String> + Sync,
-) -> Result<(f64, Signal), String> {
+    hurts: impl Fn(&Signal) -> Hurts + Sync,
+) -> Result<Option<(f64, Signal)>, String> {
     let starts = starts(signals, own, quest);
     let chains = CHAINS.min(quest.flights.max(1));
-    let results: Vec<Result<(f64, Signal), String>> = std::thread::scope(|scope| {
+    let results: Vec<Result<Option<(f64, Signal)>, String>> = std::thread::scope(|scope| {
         let chain = |number: usize| {
             let (starts, hurts) = (&starts, &hurts);
             scope.spawn(move || {
@@ -37,7 +40,7 @@ pub(super) fn search(
         threads.into_iter().map(|thread| thread.join().map_err(|_| "a search thread ended".to_string())?).collect()
     });
     let found = results.into_iter().collect::<Result<Vec<_>, _>>()?;
-    most_hurting(found.iter()).cloned().ok_or_else(|| "no flight was allowed".to_string())
+    Ok(most_hurting(found.iter().flatten()).cloned())
 }
 
 /// Signals to begin with, no more than half of the flights (but one): the mission's own if it is admitted, then periodic
@@ -55,19 +58,20 @@ fn starts(signals: &Signals, own: Option<Signal>, quest: &Quest) -> Vec<Signal> 
 /// Flies the starts, then climbs from the worst of them: takes every change that hurts no less. With each dwell time it
 /// spends half of the flights that are left, and begins with the worst so far that keeps it.
 ///
-/// What it returns hurts no less than anything it has flown.
+/// What it returns hurts no less than anything it has flown, also when it is ended before its time.
 fn climb<'a>(
     signals: &Signals,
     starts: impl Iterator<Item = &'a Signal>,
     flights: usize,
     mut stream: Stream,
-    hurts: impl Fn(&Signal) -> Result<f64, String>,
-) -> Result<(f64, Signal), String> {
+    hurts: impl Fn(&Signal) -> Hurts,
+) -> Result<Option<(f64, Signal)>, String> {
     let mut left = flights.max(1);
     let mut flown: Vec<(f64, Signal)> = Vec::new();
     for start in starts.take(left) {
         left -= 1;
-        flown.push((hurts(start)?, start.clone()));
+        let Some(value) = hurts(start)? else { return Ok(most_hurting(flown.iter()).cloned()) };
+        flown.push((value, start.clone()));
     }
     let dwells = signals.allowance().dwells();
     for (stage, &dwell) in dwells.iter().enumerate() {
@@ -85,14 +89,17 @@ fn climb<'a>(
                 continue;
             }
             (idle, spend, left) = (0, spend - 1, left - 1);
-            let value = hurts(&other)?;
+            let Some(value) = hurts(&other)? else {
+                left = 0;
+                break;
+            };
             if value >= best.0 {
                 best = (value, other);
             }
         }
         flown.push(best);
     }
-    most_hurting(flown.iter()).cloned().ok_or_else(|| "the search has no start".to_string())
+    Ok(most_hurting(flown.iter()).cloned())
 }
 
 /// The first of those that hurt most.
