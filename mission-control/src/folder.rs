@@ -258,7 +258,7 @@ fn of_run(command: &[String]) -> Option<Vec<String>> {
 
 /// A word of a command as a shell takes it.
 pub(crate) fn quoted(word: String) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/[]".contains(c);
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:,/".contains(c);
     if word.chars().all(plain) && !word.is_empty() { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 

@@ -61,7 +61,7 @@ pub(super) fn table(page: &mut String, plan: &Plan, swept: &Swept, measure: usiz
     }
     page.push_str(
         "\nThe interval is the confidence interval of the median at 95 %, from the ranks of the runs: it takes no shape of their \
-         distribution for granted, and needs six runs. It is the band in pictures.\n\n",
+         distribution for granted, and needs six runs. It is the band, or the bar, in pictures.\n\n",
     );
 }
 

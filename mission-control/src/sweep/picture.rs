@@ -22,6 +22,9 @@ const MAPS_IN_A_ROW: usize = 3;
 /// Colour of a cell without a value.
 const BLANK: &str = "#f1f2f3";
 
+/// What a dot with its band, or its bar, is.
+const INTERVAL: &str = "median, and its 95 % interval";
+
 /// The picture of a sweep, if one, two or three keys are swept: a curve, a heat map, or a heat map for every value of the first
 /// key.
 pub fn picture(plan: &Plan, cells: &[CellStatistics], measure: usize, name: &str) -> Option<String> {
@@ -72,25 +75,50 @@ fn is_wide(values: impl Iterator<Item = f64> + Clone) -> bool {
 
 fn curve(plan: &Plan, cells: &[CellStatistics], measure: usize) -> Option<Drawing> {
     let setting = swept(plan).next()?;
-    let points: Vec<(f64, Spread)> = setting
-        .values
-        .iter()
-        .zip(cells)
-        .enumerate()
-        .filter_map(|(place, (value, cell))| Some((number(value).unwrap_or(place as f64), cell.spreads[measure]?)))
-        .collect();
+    let numbers: Option<Vec<f64>> = setting.values.iter().map(number).collect();
+    // Words stand at 1, 2, ...
+    let places = numbers.clone().unwrap_or_else(|| (1..=setting.values.len()).map(|place| place as f64).collect());
+    let points: Vec<(f64, Spread)> =
+        places.into_iter().zip(cells).filter_map(|(place, cell)| Some((place, cell.spreads[measure]?))).collect();
     if points.is_empty() {
         return None;
     }
     let mut panel = Panel::default();
-    band(&mut panel, &points, 0, "median, and its 95 % interval");
-    let layout = panel.layout(&plan.mission.name, &setting.key, about(measure));
-    Some(panel.laid_out(logarithmic(layout, &points)))
+    match &numbers {
+        Some(_) => band(&mut panel, &points, 0, INTERVAL),
+        None => intervals(&mut panel, &points),
+    }
+    // The axes follow from what is on the panel.
+    let layout = panel.layout(&plan.mission.name, &setting.key, about(measure)).with_subtitle(INTERVAL);
+    if numbers.is_some() {
+        return Some(panel.laid_out(logarithmic(layout, &points)));
+    }
+    let words = labels(&setting.values);
+    let layout = logarithmic_upwards(layout, &points).with_x_axis_min(0.5).with_x_axis_max(words.len() as f64 + 0.5);
+    Some(panel.laid_out(layout.with_x_categories(words)))
+}
+
+/// Medians with the bars of their confidence intervals: between words there is nothing that a line could show.
+fn intervals(panel: &mut Panel, points: &[(f64, Spread)]) {
+    let bars = points.iter().map(|(_, spread)| {
+        let (low, high) = sure(spread);
+        (spread.median - low, high - spread.median)
+    });
+    let dots = ScatterPlot::new()
+        .with_data(points.iter().map(|(x, spread)| (*x, spread.median)).collect::<Vec<_>>())
+        .with_y_err_asymmetric(bars)
+        .with_color(colour(0))
+        .with_size(4.5);
+    panel.plots.push(dots.into());
+}
+
+fn logarithmic_upwards(layout: Layout, points: &[(f64, Spread)]) -> Layout {
+    let bounds = points.iter().flat_map(|(_, spread)| <[f64; 2]>::from(sure(spread)));
+    if is_wide(bounds) { layout.with_log_y() } else { layout }
 }
 
 fn logarithmic(layout: Layout, points: &[(f64, Spread)]) -> Layout {
-    let bounds = points.iter().flat_map(|(_, spread)| <[f64; 2]>::from(sure(spread)));
-    let layout = if is_wide(bounds) { layout.with_log_y() } else { layout };
+    let layout = logarithmic_upwards(layout, points);
     if is_wide(points.iter().map(|(x, _)| *x)) { layout.with_log_x() } else { layout }
 }
 
@@ -257,6 +285,20 @@ mod tests {
         assert!(!Scale::of(&cells(&[Some(1.0), Some(2.0)]), 0).expect("values").log);
         // The middle of the scale, in a map that has the upper half only.
         assert_eq!(scale.colours(-1.0, 0.0).map(0.0), ColorMap::Viridis.map(0.5));
+    }
+
+    #[test]
+    fn words_stand_side_by_side_with_nothing_drawn_between_them() {
+        let medians = [Some(1.0), Some(2.0)];
+        let words =
+            picture(&plan(&["coordination.between=hold,advance"]), &cells(&medians), 0, "m").expect("a picture");
+        assert!(words.contains(">hold<") && words.contains(">advance<"), "{words}");
+        let numbers = picture(&plan(&["coordination.gain=0.1,0.2"]), &cells(&medians), 0, "m").expect("a picture");
+        for svg in [&words, &numbers] {
+            assert_eq!((svg.matches("<circle").count(), svg.contains(INTERVAL)), (2, true), "{svg}");
+        }
+        let paths = |svg: &str| svg.matches("<path").count();
+        assert!(paths(&words) < paths(&numbers), "{} {}", paths(&words), paths(&numbers));
     }
 
     #[test]

@@ -180,7 +180,7 @@ pub fn labels(values: &[Value]) -> Vec<String> {
 /// `--set` that gives a key one value, ready for a shell.
 pub fn option(key: &str, value: &Value) -> String {
     let text = format!("{key}={}", shown(value));
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:[]/".contains(c);
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-=+:/".contains(c);
     if text.chars().all(plain) { format!("--set {text}") } else { format!("--set '{}'", text.replace('\'', "'\\''")) }
 }
 
