@@ -121,6 +121,43 @@ mod tests {
         }
     }
 
+    /// Φ(z), by its series about zero.
+    fn normal_share(z: f64) -> f64 {
+        let (mut term, mut sum) = (z, z);
+        for k in 1..200 {
+            term *= z * z / f64::from(2 * k + 1);
+            sum += term;
+        }
+        0.5 + sum * (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt()
+    }
+
+    /// The share below x of a gamma distribution of shape 4: the wait for the fourth of events at a mean distance of 1.
+    fn fourth_share(x: f64) -> f64 {
+        1.0 - (-x).exp() * (1.0 + x + x * x / 2.0 + x * x * x / 6.0)
+    }
+
+    #[test]
+    fn each_distribution_is_the_one_it_is_called_by() {
+        let n = 40_000;
+        let uniform = |x: f64| (x - 1.0) / 2.0;
+        let normal = |x: f64| normal_share((x - 2.0) / 0.3);
+        // Shape ((mean - min)/deviation)^2 = 4 and scale deviation^2/(mean - min) = 3/8.
+        let gamma = |x: f64| fourth_share((x - 0.5) / 0.375);
+        let cases: [(Delay, &dyn Fn(f64) -> f64); 3] = [
+            (Delay::Uniform(Span::from_secs(1.0), Span::from_secs(3.0)), &uniform),
+            (Delay::normal(2.0, 0.3, 0.0), &normal),
+            (Delay::gamma(2.0, 0.75, 0.5), &gamma),
+        ];
+        for (delay, share_below) in cases {
+            let mut delays = sample(&delay, n);
+            delays.sort_by(f64::total_cmp);
+            let apart = |(i, x): (usize, &f64)| (share_below(*x) - (i as f64 + 0.5) / n as f64).abs();
+            let apart = delays.iter().enumerate().map(apart).fold(0.0, f64::max);
+            // Kolmogorov: beyond 2.23 over the root of n with a probability of 1e-4.
+            assert!(apart * (n as f64).sqrt() < 2.23, "{delay:?}: {apart}");
+        }
+    }
+
     #[test]
     fn sound_takes_two_seconds_for_three_kilometres() {
         let delay = Delay::Distance { speed: 1500.0, extra: Span::from_secs(0.1) };

@@ -1,4 +1,5 @@
-//! Where the vehicles are, as far as their own words tell: p_i(ξ_i) of what they said last. No telemetry is on the air.
+//! Where the vehicles are, as far as their own words tell: p_i(ξ_i), with ξ_i moved on from what they said last at the rate
+//! between their last two words. No telemetry is on the air.
 
 use std::sync::Arc;
 
@@ -19,16 +20,44 @@ struct Place {
     pattern: Pattern,
     /// The newest word and what held before it, so that the order of words of one instant does not matter.
     since: Time,
-    newest: Vector3<f64>,
-    before: Vector3<f64>,
+    newest: Word,
+    before: Word,
+}
+
+/// What a vehicle said, and how fast it went.
+#[derive(Clone, Copy, Debug)]
+struct Word {
+    made: Time,
+    /// ξ without the pattern.
+    xi: f64,
+    /// Since the word before \[1/s\].
+    rate: f64,
+}
+
+impl Word {
+    fn after(self, made: Time, xi: f64) -> Word {
+        let passed = (made - self.made).secs();
+        let rate = if passed > 0.0 { (xi - self.xi) / passed } else { self.rate };
+        Word { made, xi, rate }
+    }
+
+    fn at(self, t: Time) -> f64 {
+        self.xi + self.rate * (t - self.made).secs()
+    }
+}
+
+impl Place {
+    fn position(&self, word: Word, t: Time) -> Vector3<f64> {
+        self.path.at(word.at(t) + self.pattern.at(t).h).p
+    }
 }
 
 impl Whereabouts {
     /// Every vehicle's path, its place in the pattern and the ξ at which its target starts.
     pub fn new(vehicles: impl Iterator<Item = (Arc<dyn Path>, Pattern, f64)>) -> Whereabouts {
         let place = |(path, pattern, start): (Arc<dyn Path>, Pattern, f64)| {
-            let p = path.at(start).p;
-            Place { path, pattern, since: Time::from_nanos(i64::MIN), newest: p, before: p }
+            let word = Word { made: Time::ZERO, xi: start - pattern.at(Time::ZERO).h, rate: 0.0 };
+            Place { path, pattern, since: Time::from_nanos(i64::MIN), newest: word, before: word }
         };
         Whereabouts(vehicles.map(place).collect())
     }
@@ -40,15 +69,15 @@ impl Whereabouts {
             place.before = place.newest;
             place.since = t;
         }
-        place.newest = place.path.at(xi + place.pattern.at(made).h).p;
+        place.newest = place.before.after(made, xi);
     }
 
-    /// From a vehicle that speaks at `t` to one that listens \[m\]: the speaker by its newest word, the listener by its
-    /// newest before `t`. Not a number if one of them is nowhere.
+    /// From a vehicle that speaks at `t` to one that listens \[m\], both as they are at `t`: the speaker by its newest word, the
+    /// listener by its newest before `t`. Not a number if one of them is nowhere.
     pub fn distance(&self, speaker: usize, listener: usize, t: Time) -> f64 {
-        let listener = &self.0[listener];
-        let there = if listener.since < t { listener.newest } else { listener.before };
-        (self.0[speaker].newest - there).norm()
+        let (speaker, listener) = (&self.0[speaker], &self.0[listener]);
+        let heard = if listener.since < t { listener.newest } else { listener.before };
+        (speaker.position(speaker.newest, t) - listener.position(heard, t)).norm()
     }
 }
 
@@ -69,8 +98,36 @@ mod tests {
         assert_eq!(places.distance(0, 1, t), 10f64.hypot(3.0), "from where they start");
         places.said(0, t, t, 6.0);
         assert_eq!(places.distance(0, 1, t), 5.0);
-        places.said(1, t, t, 5.0);
-        assert_eq!(places.distance(0, 1, Time::from_secs(1.1)), 9f64.hypot(3.0), "5 + 10 along the second line");
+        places.said(1, t, t, 1.0);
+        assert_eq!(
+            places.distance(1, 0, t),
+            11f64.hypot(3.0),
+            "1 + 10 along the second line; the first said 6 at this instant"
+        );
+    }
+
+    #[test]
+    fn a_word_that_waits_is_sent_from_where_the_speaker_is_by_then() {
+        let mut places = two();
+        let second = Time::from_secs(1.0);
+        places.said(0, second, second, 2.0);
+        // 2 m/s since the start; the listener said nothing and is taken to stand.
+        assert_eq!(places.distance(0, 1, Time::from_secs(3.0)), 4f64.hypot(3.0));
+        // 1 m/s since the word before, and moved on from when it was made, not from when it was heard of.
+        places.said(0, Time::from_secs(2.5), Time::from_secs(2.0), 3.0);
+        assert_eq!(places.distance(0, 1, Time::from_secs(5.0)), 4f64.hypot(3.0));
+        // The listener is where it has got to, too.
+        places.said(1, Time::from_secs(4.0), Time::from_secs(4.0), 2.0);
+        assert_eq!(places.distance(0, 1, Time::from_secs(6.0)), 6f64.hypot(3.0), "13 and 7");
+    }
+
+    #[test]
+    fn words_of_the_same_instant_and_of_the_past_keep_the_rate() {
+        let mut places = two();
+        let at = Time::from_secs;
+        places.said(0, at(1.0), at(1.0), 2.0);
+        places.said(0, at(2.0), at(1.0), 3.0);
+        assert_eq!(places.distance(0, 1, at(2.0)), 5f64.hypot(3.0), "3 and a second at 2 m/s");
     }
 
     #[test]

@@ -200,6 +200,21 @@ fn sound_takes_its_time_from_where_the_sender_is() {
 }
 
 #[test]
+fn a_message_that_waits_is_sent_from_where_its_sender_is_by_then() {
+    let medium = "medium = { rate_bps = 160.0, packet_bytes = 20, queue = 5 }";
+    let mission = mission(&format!("delay = {{ distance = {{ speed_mps = 1500.0 }} }}\n{medium}"));
+    let mut emulator = Emulator::new(mission.clone(), None);
+    // Each takes a second on the air, so the second waits for half a second, at 600 m/s.
+    for (seq, made, xi) in [(0, 1.0, 1500.0), (1, 1.5, 1800.0)] {
+        let word = CoordinationState { mission: mission.digest, sender: 0, seq, made: seconds(made), xi, scalar: None };
+        emulator.handle(seconds(made), Some(Sent { from: 0, bytes: word.encode().into() }));
+    }
+    emulator.handle(seconds(20.0), None);
+    let due = |begun: f64, x: f64| (1, seconds(begun + 1.0) + Span::from_secs(x.hypot(1.0) / 1500.0));
+    assert_eq!(deliveries(&drain(&mut emulator)), [due(1.0, 1500.0), due(2.0, 2100.0)]);
+}
+
+#[test]
 fn a_message_is_heard_within_its_range_and_not_beyond() {
     let mission = mission("range = { disc = { radius_m = 100.0 } }");
     for (xi, fate) in [(99.0, Fate::Delivered), (101.0, Fate::OutOfRange), (LARGEST_NUMBER, Fate::OutOfRange)] {
@@ -665,15 +680,15 @@ fn a_link_may_have_an_order_and_a_queue_of_its_own() {
 #[test]
 fn without_slots_those_who_speak_together_collide_unless_they_wait_at_random() {
     let words: Vec<(f64, u16, u32)> =
-        (0..50).flat_map(|seq| [0, 2].map(move |who| (f64::from(seq) * 10.0, who, seq))).collect();
+        (0..1000).flat_map(|seq| [0, 2].map(move |who| (f64::from(seq) * 10.0, who, seq))).collect();
     let collided = |more: &str| {
-        let (emulator, _) = run(&shared(&format!("collisions = true, {more}")), &words, 1000.0);
+        let (emulator, _) = run(&shared(&format!("collisions = true, {more}")), &words, 10_100.0);
         emulator.ledgers().map(|ledger| ledger.of(Fate::Collision)).sum::<u64>()
     };
-    assert_eq!(collided("backoff_s = 0.0"), 100);
+    assert_eq!(collided("backoff_s = 0.0"), 2000);
     // Two uniform waits within 8 s overlap within 1 s with probability 1 − (7/8)² = 0.234; five standard deviations.
-    let share = collided("backoff_s = 8.0") as f64 / 100.0;
-    assert!((share - 0.234).abs() < 5.0 * (0.234f64 * 0.766 / 50.0).sqrt(), "{share}");
+    let share = collided("backoff_s = 8.0") as f64 / 2000.0;
+    assert!((share - 0.234).abs() < 5.0 * (0.234f64 * 0.766 / 1000.0).sqrt(), "{share}");
 }
 
 #[test]
