@@ -18,13 +18,23 @@ pub(super) fn check_talk(
         let allowed = "periodic, or a law that needs nothing beside xi";
         faults.fault("coordination.talk", format!("event_triggered with a law that sends its {says}"), allowed);
     }
-    for (name, span) in [
-        ("least_silence_s", Some(talk.least_silence_s)),
-        ("most_silence_s", talk.most_silence_s),
-        ("patience_s", talk.patience_s),
+    let silence = |name, span: f64| (name, span, (0.0..=LONGEST_SILENCE_S).contains(&span), "0 to 86400 s");
+    let wait = |name, span: Option<f64>| {
+        let ok = span.is_none_or(|span| span > 0.0 && span <= LONGEST_SILENCE_S);
+        (name, span.unwrap_or(0.0), ok, "above 0, to 86400 s")
+    };
+    let mut sound = true;
+    for (name, value, ok, allowed) in [
+        ("threshold", talk.threshold, talk.threshold > 0.0, "above 0"),
+        ("start", talk.start, talk.start >= 0.0, "0 or more"),
+        ("decay_per_s", talk.decay_per_s, talk.decay_per_s >= 0.0, "0 or more"),
+        ("jitter", talk.jitter, (0.0..1.0).contains(&talk.jitter), "0 to below 1"),
+        silence("least_silence_s", talk.least_silence_s),
+        wait("most_silence_s", talk.most_silence_s),
+        wait("patience_s", talk.patience_s),
     ] {
-        let span = span.unwrap_or(0.0);
-        faults.number(&format!("{key}.{name}"), span, (0.0..=LONGEST_SILENCE_S).contains(&span), "0 to 86400 s");
+        faults.number(&format!("{key}.{name}"), value, ok, allowed);
+        sound &= ok && value.is_finite();
     }
     // Silence is information: a neighbour that is silent because all is as believed must not leave N_i.
     if let Some(validity) = file.coordination.validity_s {
@@ -35,10 +45,13 @@ pub(super) fn check_talk(
         let longer = talk.most_silence_s.is_some_and(|most| validity > most);
         faults.number("coordination.validity_s", validity, longer, &allowed);
     }
+    if !sound {
+        return None;
+    }
     match Trigger::new(settings(talk)) {
         Ok(trigger) => Some(trigger),
         Err(reason) => {
-            faults.fault(key, reason, "a threshold above 0, and a longest silence or a patience");
+            faults.fault(key, reason, "most_silence_s, not below least_silence_s, or patience_s");
             None
         }
     }

@@ -8,10 +8,16 @@ use crate::random::Stream;
 /// Longest mean burst or gap, and longest recorded trace \[messages\].
 const MOST_MESSAGES: f64 = 1e6;
 
-/// Name of the stream of fades that links share.
-const FADES: &str = "fades";
+/// Name of the stream of fades that links share; those of `[[network.also]]` share their own.
+pub(super) const FADES: &str = "fades";
 
-pub(super) fn check(faults: &mut Collector<'_>, key: &str, loss: &LossChoice, seed: u64) -> Option<Loss> {
+/// `fades` names the stream of what links share, should they.
+pub(super) fn check(
+    faults: &mut Collector<'_>,
+    key: &str,
+    loss: &LossChoice,
+    (seed, fades): (u64, &str),
+) -> Option<Loss> {
     let mut probability = |key: &str, value: f64| {
         faults.number(key, value, (0.0..=1.0).contains(&value), "a probability, 0 to 1");
     };
@@ -51,7 +57,7 @@ pub(super) fn check(faults: &mut Collector<'_>, key: &str, loss: &LossChoice, se
                 let burst_ok = f.mean_burst >= least - 1e-9;
                 faults.number(&format!("{key}.mean_burst"), f.mean_burst, burst_ok, &allowed);
             }
-            let common = Stream::new(seed, FADES);
+            let common = Stream::new(seed, fades);
             Some(Loss::SharedFades(SharedFades::new(f.probability, f.mean_burst, f.correlation, common)))
         }
         LossChoice::Trace(trace) => {

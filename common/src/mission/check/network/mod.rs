@@ -61,7 +61,7 @@ pub(super) fn check_links(
     let corrupt = probability(faults, "network.corrupt_probability", network.corrupt_probability);
     let in_order = network.order == Some(OrderChoice::InOrder);
     let queue = check_queue(faults, "network.queue", network.queue);
-    let lossy = loss::check(faults, "network.loss", &loss, file.seed);
+    let lossy = loss::check(faults, "network.loss", &loss, (file.seed, loss::FADES));
     let mut links: Vec<Link> = Vec::new();
     // A complete graph of 256 vehicles has 65,280 links: none may be looked for among all others.
     let mut known: HashSet<(usize, usize)> = HashSet::new();
@@ -102,16 +102,24 @@ fn check_exceptions(
     links: &mut [Link],
 ) {
     let places = places(links);
+    let mut told = HashSet::new();
     for (i, exception) in network.exceptions.iter().enumerate() {
         let key = format!("network.exceptions[{i}]");
         let pair = [exception.from.clone(), exception.to.clone()];
         let Some(link) = link_of(faults, &key, &pair, ids, &places) else { continue };
+        if !told.insert(link) {
+            faults.fault(&key, format!("a second exception for {} -> {}", pair[0], pair[1]), "each link once");
+        }
+        if exception.says_nothing() {
+            let allowed = "delay, loss, range, duplicate_probability, corrupt_probability, order or queue";
+            faults.fault(&key, "an exception without a model", allowed);
+        }
         let link = &mut links[link];
         if let Some(delay) = &exception.delay {
             link.layers[0].delay = delay::check(faults, &format!("{key}.delay"), delay);
         }
         if let Some(loss) = &exception.loss {
-            link.layers[0].loss = loss::check(faults, &format!("{key}.loss"), loss, file.seed);
+            link.layers[0].loss = loss::check(faults, &format!("{key}.loss"), loss, (file.seed, loss::FADES));
         }
         if let Some(range) = &exception.range {
             link.range = range::check(faults, &format!("{key}.range"), range);
@@ -147,9 +155,14 @@ fn check_further(
             faults.fault(&key, "no model", "delay, loss or switching");
         }
         let delay = further.delay.as_ref().map(|delay| delay::check(faults, &format!("{key}.delay"), delay));
-        let loss: Option<Loss> =
-            further.loss.as_ref().and_then(|loss| loss::check(faults, &format!("{key}.loss"), loss, file.seed));
-        let chosen = links_of(faults, &format!("{key}.links"), further.links.as_deref(), ids, &places);
+        let fades = format!("{}/also[{i}]", loss::FADES);
+        let loss: Option<Loss> = further
+            .loss
+            .as_ref()
+            .and_then(|loss| loss::check(faults, &format!("{key}.loss"), loss, (file.seed, &fades)));
+        let key = format!("{key}.links");
+        let chosen = links_of(faults, &key, further.links.as_deref(), ids, &places);
+        check_chosen(faults, &key, further.links.as_deref());
         if delay.is_none() && loss.is_none() {
             continue;
         }
@@ -157,6 +170,20 @@ fn check_further(
             let stream = format!("{}/also[{i}]", links[index].layers[0].stream);
             let layer = Layer { stream, delay: delay.clone().unwrap_or_default(), loss: loss.clone() };
             links[index].layers.push(layer);
+        }
+    }
+}
+
+/// Links that a further model is for: some, and none of them twice, which would pass every message through it twice.
+fn check_chosen(faults: &mut Collector<'_>, key: &str, chosen: Option<&[[String; 2]]>) {
+    let Some(chosen) = chosen else { return };
+    if chosen.is_empty() {
+        faults.fault(key, "no links", "some links, or no such key for all of them");
+    }
+    let mut told = HashSet::new();
+    for (i, pair) in chosen.iter().enumerate() {
+        if !told.insert(pair) {
+            faults.fault(&format!("{key}[{i}]"), format!("{} -> {} a second time", pair[0], pair[1]), "each link once");
         }
     }
 }

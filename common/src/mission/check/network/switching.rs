@@ -84,6 +84,12 @@ fn check(
             check_period(faults, &format!("{key}.dwell_s"), r.dwell_s, scope.duration);
             let ok = r.dwell_s > 0.0 && r.dwell_s <= r.t_0_s;
             faults.number(&format!("{key}.dwell_s"), r.dwell_s, ok, "above 0 and at most t_0_s");
+            let most = most_lost(r.t_0_s, r.dwell_s);
+            if ok && (0.0..1.0).contains(&r.alpha) {
+                let allowed =
+                    format!("0 to {most} with this t_0_s and dwell_s: no loss is longer, and no recovery shorter");
+                faults.number(&format!("{key}.alpha"), r.alpha, r.alpha <= most + 1e-9, &allowed);
+            }
             let stream = Stream::new(scope.seed, &scope.stream);
             Some(Switching::random(n, r.alpha, Span::from_secs(r.t_0_s), Span::from_secs(r.dwell_s), stream))
         }
@@ -98,6 +104,11 @@ fn check(
         }
         SwitchingChoice::Trace(trace) => check_trace(faults, &format!("{key}.trace"), trace, scope, only),
     }
+}
+
+/// The greatest share of time that losses of at most T_0 take with a dwell time between them: T_0/(T_0 + dwell).
+fn most_lost(t_0_s: f64, dwell_s: f64) -> f64 {
+    t_0_s / (t_0_s + dwell_s)
 }
 
 /// Whether a group has a link that the signal counts for.
@@ -127,7 +138,7 @@ fn check_intervals(
         faults.fault(&format!("{key}.up"), "no intervals", allowed);
     }
     if only.is_none() {
-        check_union(faults, scope, &up, key);
+        check_union(faults, scope, (&up, choice.period_s.is_some()), key);
     }
     Some(Switching::intervals(scope.links.len(), up, choice.period_s.map(Span::from_secs)))
 }
@@ -237,7 +248,7 @@ fn check_trace(
         }
     }
     if only.is_none() {
-        check_union(faults, scope, &up, key);
+        check_union(faults, scope, (&up, false), key);
     }
     Some(Switching::intervals(scope.links.len(), up, None))
 }
@@ -253,10 +264,11 @@ fn check_period(faults: &mut Collector<'_>, key: &str, value: f64, duration: f64
     );
 }
 
-/// Links that are up at some time must be enough for everyone's word to reach everyone.
-fn check_union(faults: &mut Collector<'_>, scope: &Scope<'_>, up: &[UpInterval], key: &str) {
-    let mut ever = vec![up.iter().any(|interval| interval.links.is_none()); scope.links.len()];
-    up.iter().filter_map(|interval| interval.links.as_ref()).flatten().for_each(|link| ever[*link] = true);
+/// Links that are up at some time of the mission must be enough for everyone's word to reach everyone.
+fn check_union(faults: &mut Collector<'_>, scope: &Scope<'_>, (up, periodic): (&[UpInterval], bool), key: &str) {
+    let up = || up.iter().filter(|interval| periodic || interval.from.secs() < scope.duration);
+    let mut ever = vec![up().any(|interval| interval.links.is_none()); scope.links.len()];
+    up().filter_map(|interval| interval.links.as_ref()).flatten().for_each(|link| ever[*link] = true);
     let arcs: Vec<(usize, usize)> =
         scope.links.iter().zip(ever).filter(|(_, ever)| *ever).map(|(link, _)| (link.to, link.from)).collect();
     let n = scope.vehicles;

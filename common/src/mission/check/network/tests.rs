@@ -5,6 +5,7 @@ mod preset_sources;
 use super::super::super::Mission;
 use super::super::super::file::Preset;
 use crate::network::Medium;
+use crate::random::Stream;
 use crate::time::{Span, Time};
 
 const HELIX: &str = include_str!("../../../../../missions/auv-helix.toml");
@@ -152,6 +153,37 @@ fn each_fault_names_its_key_what_was_found_and_what_is_allowed() {
             "not a link",
             "network.links",
         ),
+        (
+            "also = [{ links = [[\"auv1\", \"auv2\"], [\"auv1\", \"auv2\"]], loss = { bernoulli = { probability = 0.1 } } }]",
+            "also[0].links[1]",
+            "auv1 -> auv2 a second time",
+            "each link once",
+        ),
+        (
+            "also = [{ links = [], loss = { bernoulli = { probability = 0.1 } } }]",
+            "also[0].links",
+            "no links",
+            "all of them",
+        ),
+        (
+            "exceptions = [{ from = \"auv1\", to = \"auv2\", queue = 1 }, { from = \"auv1\", to = \"auv2\", queue = 2 }]",
+            "exceptions[1]",
+            "a second exception for auv1 -> auv2",
+            "each link once",
+        ),
+        ("exceptions = [{ from = \"auv1\", to = \"auv2\" }]", "exceptions[0]", "without a model", "delay, loss"),
+        (
+            "switching = { random = { alpha = 0.7, t_0_s = 2.0, dwell_s = 1.0 } }",
+            "switching.random.alpha",
+            "0.7",
+            "0 to 0.6666666666666666",
+        ),
+        (
+            "switching = { intervals = { up = [{ from_s = 800.0, to_s = 900.0 }] } }",
+            "switching.intervals",
+            "a graph that can never be connected",
+            "links that come up",
+        ),
         ("preset = \"telepathy\"", "preset", "telepathy", "perfect"),
     ] {
         let said = faults(network);
@@ -230,6 +262,51 @@ fn a_trace_says_when_links_are_up() {
     assert_eq!(up[2], [false, false, true, false]);
     assert_eq!(up[3], [true, false, true, false]);
     assert_eq!(up[4], [false, false, true, false]);
+}
+
+#[test]
+fn the_greatest_share_of_losses_and_every_smaller_one_can_be_asked_for() {
+    for alpha in [0.0, 0.5, 2.0 / 3.0] {
+        mission(&format!("switching = {{ random = {{ alpha = {alpha:?}, t_0_s = 2.0, dwell_s = 1.0 }} }}"));
+    }
+}
+
+/// Which of the first messages each link loses.
+fn lost(network: &str, messages: u64) -> Vec<Vec<bool>> {
+    let mission = mission(network);
+    let of_link = |link: &crate::mission::Link| {
+        let mut layers: Vec<_> = link
+            .layers
+            .iter()
+            .filter_map(|layer| Some((Stream::new(mission.seed, &layer.stream), layer.loss.clone()?)))
+            .collect();
+        let mut loses = |number: u64| {
+            layers.iter_mut().fold(false, |lost, (stream, loss)| {
+                let drawn = stream.units_at(number);
+                lost | loss.loses(stream, number, &drawn)
+            })
+        };
+        (0..messages).map(&mut loses).collect()
+    };
+    mission.links.iter().map(of_link).collect()
+}
+
+/// Fades of one model are shared by its links, and by no other model's.
+#[test]
+fn fades_of_different_models_are_independent() {
+    const N: u64 = 40_000;
+    let fades = "loss = { shared_fades = { probability = 0.3, mean_burst = 2.0, correlation = 1.0 } }";
+    let share = |lost: &[bool]| lost.iter().filter(|lost| **lost).count() as f64 / N as f64;
+    // Bursts of two make the messages worth a quarter as many independent ones.
+    let bound = |p: f64| 5.0 * (p * (1.0 - p) * 4.0 / N as f64).sqrt();
+    let stacked = lost(&format!("{fades}\nalso = [{{ {fades} }}]"), N);
+    let expected = 1.0 - 0.7 * 0.7;
+    assert!((share(&stacked[0]) - expected).abs() < bound(expected), "{}", share(&stacked[0]));
+    let group = |a: &str, b: &str| format!("{{ links = [[\"{a}\", \"{b}\"]], {fades} }}");
+    let groups = lost(&format!("also = [{}, {}]", group("auv1", "auv2"), group("auv2", "auv3")), N);
+    let both: Vec<bool> = groups[0].iter().zip(&groups[2]).map(|(a, b)| *a && *b).collect();
+    assert!((share(&groups[0]) - 0.3).abs() < bound(0.3) && (share(&groups[2]) - 0.3).abs() < bound(0.3));
+    assert!((share(&both) - 0.09).abs() < bound(0.09), "{}", share(&both));
 }
 
 #[test]

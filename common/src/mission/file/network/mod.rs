@@ -103,6 +103,25 @@ pub struct LinkException {
     pub queue: Option<u32>,
 }
 
+impl LinkException {
+    /// Whether it makes no exception.
+    pub fn says_nothing(&self) -> bool {
+        let LinkException {
+            from: _,
+            to: _,
+            delay,
+            loss,
+            range,
+            duplicate_probability,
+            corrupt_probability,
+            order,
+            queue,
+        } = self;
+        let models = delay.is_none() && loss.is_none() && range.is_none() && order.is_none() && queue.is_none();
+        models && duplicate_probability.is_none() && corrupt_probability.is_none()
+    }
+}
+
 /// Further models: delays add up, a message is lost if any model loses it, a link is up while all signals have it up.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct FurtherModels {
