@@ -225,7 +225,7 @@ enum What {
         Half of the flights go to signals to begin with: the mission's own if it is admitted, periodic extremes and random\n\
         losses; the rest to changes of the worst. What is found is no milder than any that was flown; that there is no\n\
         worse one is not shown.\n\n\
-        Example:\n  mission-control worst missions/talk/naive.toml --alpha 0.5 --t0 5 --dwell 1\n\n\
+        Example:\n  mission-control worst missions/brief-losses.toml --alpha 0.75 --t0 7.5 --dwell 2.5\n\n\
         Exit codes: 0 found, 1 interrupted (the worst so far is saved), 2 a wrong mission or number, or --out is a file that no search made,\n  \
         4 output cannot be written."
     )]

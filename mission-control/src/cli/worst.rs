@@ -1,6 +1,6 @@
 //! The command `worst`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
@@ -50,6 +50,10 @@ pub(super) fn worst(args: &WorstArgs) -> Ended {
     let mission = load(&args.mission)?;
     let quest = quest(args)?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("worst-{}.toml", mission.name)));
+    let place = |path: &Path| path.canonicalize().ok();
+    if place(&out).is_some_and(|out| place(&args.mission) == Some(out)) {
+        return Err(End(2, format!("--out: found the mission itself, {}; allowed: another file", out.display())));
+    }
     let progress = Mutex::new(Progress::new(mission.end));
     let stop = StopFlag::on_signals();
     stop.arm();
@@ -69,10 +73,11 @@ pub(super) fn worst(args: &WorstArgs) -> Ended {
     } else {
         tell(&mission, &found);
     }
-    match found.complete {
-        true => Ok(ExitCode::SUCCESS),
-        false => Err(End(1, format!("interrupted after {} of {} flights", found.flights, args.flights))),
+    if found.complete {
+        return Ok(ExitCode::SUCCESS);
     }
+    bus::remark!("interrupted after {} of {} flights", found.flights, args.flights);
+    Ok(ExitCode::from(1))
 }
 
 /// What is looked for, if the numbers given can be.
@@ -95,13 +100,19 @@ fn quest(args: &WorstArgs) -> Result<Quest, End> {
     })
 }
 
+/// A ratio with digits that count.
+fn short(ratio: f64) -> String {
+    if (1e-2..1e4).contains(&ratio) { format!("{ratio:.3}") } else { format!("{ratio:.2e}") }
+}
+
 /// What was found, for a person.
 fn tell(mission: &Mission, found: &Worst) {
     let when = match found.hurt {
         Hurt::End => "at the end",
         Hurt::Mean => "on average",
     };
-    bus::tell!("{}: coordination error {when} ({} flights of {})", mission.name, found.flights, mission.end);
+    let cut = if found.complete { "" } else { ", then interrupted" };
+    bus::tell!("{}: coordination error {when} ({} flights of {}{cut})", mission.name, found.flights, mission.end);
     bus::tell!("  at the start          {:.4e}", found.initial);
     bus::tell!("  as the mission is     {:.4e}", found.as_written);
     let decay = match found.rate {
@@ -120,7 +131,7 @@ fn tell(mission: &Mission, found: &Worst) {
                 _ => "",
             };
             let times = match found.worst > 0.0 {
-                true => format!("{:.3} times the worst found", bound / found.worst),
+                true => format!("{} times the worst found", short(bound / found.worst)),
                 false => "none was found".to_string(),
             };
             bus::tell!("  {statement} allows {bound:.4e} {when}, a decay at {rate:.5} 1/s: {times}{beyond}");

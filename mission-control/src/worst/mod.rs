@@ -2,7 +2,6 @@
 
 mod search;
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -16,7 +15,7 @@ use common::theory::monitor::Envelope;
 use common::time::{Span, Time};
 use serde::Serialize;
 
-use self::search::search;
+use self::search::{most_hurting, search};
 use crate::simulate::simulate;
 use crate::theory;
 
@@ -134,7 +133,8 @@ impl Errors {
     }
 }
 
-fn fly(text: &str) -> Result<Errors, String> {
+/// Flies a mission to its end; none if it is not to go on.
+fn fly(text: &str, go_on: impl Fn() -> bool) -> Result<Option<Errors>, String> {
     let mission = Arc::new(Mission::parse("the mission", text).map_err(|faults| faults.to_string())?);
     // Rows of one instant come from all vehicles, though not one after the other.
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); mission.vehicles.len()];
@@ -145,14 +145,17 @@ fn fly(text: &str) -> Result<Errors, String> {
             rows[index].push(state.xi - mission.vehicles[index].pattern.at(Time::from_nanos(state.t_ns)).h);
         }
     };
-    simulate(&mission, record, |_| true)?;
+    simulate(&mission, record, |_| go_on())?;
+    if !go_on() {
+        return Ok(None);
+    }
     let instants = rows.iter().map(Vec::len).min().unwrap_or(0);
     let norm = |instant: usize| disagreement::of_fleet(rows.iter().map(|xi| xi[instant]));
     let norms: Vec<f64> = (0..instants).map(norm).collect();
     let (Some(&initial), Some(&end)) = (norms.first(), norms.last()) else {
         return Err("a flight recorded nothing".to_string());
     };
-    Ok(Errors { initial, end, mean: norms.iter().sum::<f64>() / instants as f64 })
+    Ok(Some(Errors { initial, end, mean: norms.iter().sum::<f64>() / instants as f64 }))
 }
 
 /// Why no worst signal was found, or none could be saved.
@@ -173,23 +176,33 @@ impl From<String> for Unfound {
 /// How a saved mission begins.
 const HEAD: &str = "# The worst switching signal found with ";
 
-/// Whether the worst mission can be saved there: in place of an earlier one, but of nothing else.
+/// Whether the worst mission can be saved there: in place of an earlier one, but of nothing else. Asked before the search, for
+/// that may take an hour.
 fn vacant(out: &Path) -> Result<(), Unfound> {
-    let unwritten = |reason: String| Err(Unfound::Unwritten(format!("cannot write {}: {reason}", out.display())));
-    match std::fs::read(out) {
-        Ok(bytes) if bytes.starts_with(HEAD.as_bytes()) => Ok(()),
-        Ok(_) => Err(Unfound::Refused(format!(
+    let unwritten = |reason: String| Unfound::Unwritten(format!("cannot write {}: {reason}", out.display()));
+    let there = match std::fs::metadata(out) {
+        Ok(there) if there.is_file() => std::fs::read(out).map_err(|error| unwritten(error.to_string()))?,
+        Ok(_) => return Err(unwritten("it is no file".to_string())),
+        Err(_) => Vec::new(),
+    };
+    if !(there.is_empty() || there.starts_with(HEAD.as_bytes())) {
+        return Err(Unfound::Refused(format!(
             "{} is there, and not from an earlier search: it would be lost; name another file with --out",
             out.display()
-        ))),
-        Err(error) if error.kind() == ErrorKind::NotFound => match out.parent() {
-            Some(folder) if folder != Path::new("") && !folder.is_dir() => {
-                unwritten(format!("there is no folder {}", folder.display()))
-            }
-            _ => Ok(()),
-        },
-        Err(error) => unwritten(error.to_string()),
+        )));
     }
+    // An empty file stays if the search is killed, and is vacant.
+    let opened = std::fs::OpenOptions::new().append(true).create(true).open(out);
+    opened.map(drop).map_err(|error| unwritten(error.to_string()))
+}
+
+/// Saves the mission, whole or not at all.
+fn save(out: &Path, text: &str) -> Result<(), Unfound> {
+    let mut part = out.as_os_str().to_owned();
+    part.push(".part");
+    crate::folder::write(Path::new(&part), text.as_bytes()).map_err(Unfound::Unwritten)?;
+    let renamed = std::fs::rename(&part, out);
+    renamed.map_err(|error| Unfound::Unwritten(format!("cannot write {}: {error}", out.display())))
 }
 
 /// Searches, on four threads, and saves the mission with the worst signal found as `out`, with what it was found by. `source` is
@@ -219,24 +232,29 @@ pub fn worst(
     let space = if file.about.is_empty() { "" } else { " " };
     let more = format!("{space}Under the worst switching signal found with {allowed}, seed {}.", quest.seed);
     let rewriter = Rewriter { file, links, more };
-    let written = fly(&mission.text)?;
+    let ended = AtomicBool::new(false);
+    let under_way = || !ended.load(Ordering::Relaxed);
+    let Some(written) = fly(&mission.text, || true)? else { return Err("not flown".to_string().into()) };
 
-    let (flown, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let hurts = |signal: &Signal| {
-        if ended.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
-        let errors = fly(&rewriter.text(&signals, signal)?)?;
-        if !go_on(flown.fetch_add(1, Ordering::Relaxed) + 1) {
+    let (flown, complete) = (AtomicUsize::new(0), AtomicBool::new(true));
+    let known = own.clone().map(|signal| (written, signal));
+    let flight = |signal: &Signal| {
+        let errors = if under_way() { fly(&rewriter.text(&signals, signal)?, under_way)? } else { None };
+        if errors.is_none() {
+            complete.store(false, Ordering::Relaxed);
+        } else if !go_on(flown.fetch_add(1, Ordering::Relaxed) + 1) {
             ended.store(true, Ordering::Relaxed);
         }
-        Ok(Some(errors.hurt(quest.hurt)))
+        Ok(errors)
     };
-    let found = search(&signals, own, quest, hurts)?;
-    let (flights, complete) = (flown.into_inner(), !ended.into_inner());
-    let (worst, signal) = found.ok_or_else(|| "no flight was allowed".to_string())?;
+    let found = search(&signals, own, quest, flight)?;
+    let (flights, complete) = (flown.into_inner(), complete.into_inner());
+    // An interrupted search may not have come to the mission's own signal.
+    let found = most_hurting(found.iter().chain(&known), quest.hurt).cloned();
+    let (errors, signal) = found.ok_or_else(|| "interrupted before a flight was over".to_string())?;
+    let worst = errors.hurt(quest.hurt);
     let text = rewriter.text(&signals, &signal)?;
-    let Errors { initial, end, .. } = fly(&text)?;
+    let Errors { initial, end, .. } = errors;
     let hurt = quest.hurt.as_str();
     let ended = if complete { "" } else { " The search was interrupted then; in full it is:" };
     let head = format!(
@@ -247,7 +265,7 @@ pub fn worst(
         quest.flights,
         quest.seed
     );
-    crate::folder::write(out, (head + &text).as_bytes()).map_err(Unfound::Unwritten)?;
+    save(out, &(head + &text))?;
 
     let length = mission.end - Time::ZERO;
     let allowed = |envelope: &Envelope| initial * quest.hurt.allowed(envelope, length.secs());
@@ -336,7 +354,7 @@ mod tests {
         let quest = Quest { allowance: allowance(0.75, 7.5, 2.5), hurt: Hurt::End, flights: 40, seed: 1 };
         let out = folder.path().join("worst.toml");
         let found = worst(&brief(), &quest, "m.toml", &out, |flown| flown < 5).expect("found");
-        // Flights under way on the other threads come to their end.
+        // Of the flights under way on the other threads, some may have come to their end.
         assert!(!found.complete && (5..9).contains(&found.flights) && found.worst >= found.as_written, "{found:?}");
         let text = std::fs::read_to_string(&out).expect("saved");
         assert!(
@@ -354,13 +372,16 @@ mod tests {
         let own = folder.path().join("own.toml");
         std::fs::write(&own, BRIEF_LOSSES).expect("written");
         let quest = Quest { allowance: allowance(0.75, 7.5, 2.5), hurt: Hurt::End, flights: 1, seed: 1 };
-        let search = |out: &std::path::Path| worst(&brief(), &quest, "m.toml", out, |_| true);
+        let search = |out: &std::path::Path| worst(&brief(), &quest, "m.toml", out, |_| false);
         assert!(matches!(search(&own), Err(Unfound::Refused(reason)) if reason.contains("own.toml is there")));
         assert_eq!(std::fs::read_to_string(&own).expect("there"), BRIEF_LOSSES);
-        // Told before the search and not after.
         let nowhere = folder.path().join("nowhere/worst.toml");
-        assert!(matches!(search(&nowhere), Err(Unfound::Unwritten(reason)) if reason.contains("there is no folder")));
-        assert!(matches!(search(folder.path()), Err(Unfound::Unwritten(_))));
+        assert!(matches!(search(&nowhere), Err(Unfound::Unwritten(reason)) if reason.contains("nowhere")));
+        assert!(matches!(search(folder.path()), Err(Unfound::Unwritten(reason)) if reason.contains("no file")));
+        assert!(matches!(search("/dev/null".as_ref()), Err(Unfound::Unwritten(_))));
+        let empty = folder.path().join("empty.toml");
+        std::fs::write(&empty, "").expect("written");
+        assert!(search(&empty).is_ok_and(|found| found.complete), "one flight of one, and the last word was to stop");
     }
 
     #[test]
@@ -385,7 +406,7 @@ mod tests {
         let found = found(&brief(), (0.75, 7.5, 0.5), 40).worst;
         for seed in 11..21 {
             let random = random.replace("seed = 1\n", &format!("seed = {seed}\n"));
-            let errors = super::fly(&random).expect("flown");
+            let errors = super::fly(&random, || true).expect("flown").expect("to its end");
             assert!(errors.end <= found, "seed {seed}: {} {found}", errors.end);
         }
     }

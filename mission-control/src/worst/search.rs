@@ -3,7 +3,7 @@
 use common::graph::adversary::{Signal, Signals};
 use common::random::Stream;
 
-use super::Quest;
+use super::{Errors, Hurt, Quest};
 
 /// Searches that go on side by side: a fixed number, so that what is found does not depend on the machine.
 const CHAINS: usize = 4;
@@ -11,10 +11,13 @@ const CHAINS: usize = 4;
 /// So many changes in a row may change nothing.
 const MOST_IDLE: usize = 1000;
 
-/// How much a signal hurts; none if it was not flown, for the search has been ended.
-pub(super) type Hurts = Result<Option<f64>, String>;
+/// The errors under a signal; none if it was not flown, or not to its end, for the search has been ended.
+pub(super) type Flown = Result<Option<Errors>, String>;
 
-/// The signal that hurts most of those that were flown, and how much it hurts; none if none was.
+/// A signal and the errors under it.
+pub(super) type Found = (Errors, Signal);
+
+/// The signal that hurts most of those that were flown; none if none was.
 ///
 /// # Errors
 /// What could not be flown.
@@ -22,25 +25,25 @@ pub(super) fn search(
     signals: &Signals,
     own: Option<Signal>,
     quest: &Quest,
-    hurts: impl Fn(&Signal) -> Hurts + Sync,
-) -> Result<Option<(f64, Signal)>, String> {
+    fly: impl Fn(&Signal) -> Flown + Sync,
+) -> Result<Option<Found>, String> {
     let starts = starts(signals, own, quest);
     let chains = CHAINS.min(quest.flights.max(1));
-    let results: Vec<Result<Option<(f64, Signal)>, String>> = std::thread::scope(|scope| {
+    let results: Vec<Result<Option<Found>, String>> = std::thread::scope(|scope| {
         let chain = |number: usize| {
-            let (starts, hurts) = (&starts, &hurts);
+            let (starts, fly) = (&starts, &fly);
             scope.spawn(move || {
                 let stream = Stream::new(quest.seed, &format!("worst/{number}"));
                 let more = usize::from(number < quest.flights % chains);
                 let own_starts = starts.iter().skip(number).step_by(chains);
-                climb(signals, own_starts, quest.flights / chains + more, stream, hurts)
+                climb((signals, quest.hurt), own_starts, quest.flights / chains + more, stream, fly)
             })
         };
         let threads: Vec<_> = (0..chains).map(chain).collect();
         threads.into_iter().map(|thread| thread.join().map_err(|_| "a search thread ended".to_string())?).collect()
     });
     let found = results.into_iter().collect::<Result<Vec<_>, _>>()?;
-    Ok(most_hurting(found.iter().flatten()).cloned())
+    Ok(most_hurting(found.iter().flatten(), quest.hurt).cloned())
 }
 
 /// Signals to begin with, no more than half of the flights (but one): the mission's own if it is admitted, then periodic
@@ -60,26 +63,25 @@ fn starts(signals: &Signals, own: Option<Signal>, quest: &Quest) -> Vec<Signal> 
 ///
 /// What it returns hurts no less than anything it has flown, also when it is ended before its time.
 fn climb<'a>(
-    signals: &Signals,
+    (signals, hurt): (&Signals, Hurt),
     starts: impl Iterator<Item = &'a Signal>,
     flights: usize,
     mut stream: Stream,
-    hurts: impl Fn(&Signal) -> Hurts,
-) -> Result<Option<(f64, Signal)>, String> {
+    fly: impl Fn(&Signal) -> Flown,
+) -> Result<Option<Found>, String> {
     let mut left = flights.max(1);
-    let mut flown: Vec<(f64, Signal)> = Vec::new();
+    let mut flown: Vec<Found> = Vec::new();
     for start in starts.take(left) {
         left -= 1;
-        let Some(value) = hurts(start)? else { return Ok(most_hurting(flown.iter()).cloned()) };
-        flown.push((value, start.clone()));
+        let Some(errors) = fly(start)? else { return Ok(most_hurting(flown.iter(), hurt).cloned()) };
+        flown.push((errors, start.clone()));
     }
     let dwells = signals.allowance().dwells();
     for (stage, &dwell) in dwells.iter().enumerate() {
         let signals = signals.with_dwell(dwell);
         let mut spend = if stage + 1 < dwells.len() { left / 2 } else { left };
-        let Some(mut best) = most_hurting(flown.iter().filter(|(_, signal)| signals.admits(signal))).cloned() else {
-            continue;
-        };
+        let admitted = flown.iter().filter(|(_, signal)| signals.admits(signal));
+        let Some(mut best) = most_hurting(admitted, hurt).cloned() else { continue };
         // A change that changes nothing is no flight; where almost nothing can change, the search ends early.
         let mut idle = 0;
         while spend > 0 && idle < MOST_IDLE {
@@ -89,20 +91,20 @@ fn climb<'a>(
                 continue;
             }
             (idle, spend, left) = (0, spend - 1, left - 1);
-            let Some(value) = hurts(&other)? else {
+            let Some(errors) = fly(&other)? else {
                 left = 0;
                 break;
             };
-            if value >= best.0 {
-                best = (value, other);
+            if errors.hurt(hurt) >= best.0.hurt(hurt) {
+                best = (errors, other);
             }
         }
         flown.push(best);
     }
-    Ok(most_hurting(flown.iter()).cloned())
+    Ok(most_hurting(flown.iter(), hurt).cloned())
 }
 
 /// The first of those that hurt most.
-fn most_hurting<'a>(flown: impl Iterator<Item = &'a (f64, Signal)>) -> Option<&'a (f64, Signal)> {
-    flown.reduce(|most, other| if other.0 > most.0 { other } else { most })
+pub(super) fn most_hurting<'a>(flown: impl Iterator<Item = &'a Found>, hurt: Hurt) -> Option<&'a Found> {
+    flown.reduce(|most, other| if other.0.hurt(hurt) > most.0.hurt(hurt) { other } else { most })
 }
