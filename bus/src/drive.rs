@@ -86,7 +86,7 @@ pub trait Port {
     /// How the program ends.
     type Exit;
 
-    /// Whether the loop shall be awake when the machine's deadlines come, so as to meet them to the microsecond. That costs up to
+    /// Whether the loop shall be awake when the machine's deadlines come, so as to meet them to a few microseconds where it can. That costs up to
     /// 100 µs of a processor for each, and an eighth of one in all.
     const PUNCTUAL: bool = false;
 

@@ -12,7 +12,7 @@ use std::sync::mpsc::{RecvError, RecvTimeoutError, TryRecvError};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How many hints to the processor, of some 20 ns each, are between two looks at a queue that is watched.
+/// How many hints to the processor, of some 20 to 50 ns each, are between two looks at a queue that is watched.
 const HINTS: usize = 32;
 
 /// A queue for at most `capacity` state-plane packets and as many other events.
@@ -241,7 +241,7 @@ impl<E> Events<E> {
         }
     }
 
-    /// Waits without patience and without sleeping: ends within a microsecond of the deadline, at the price of a processor for so long.
+    /// Waits without patience and without sleeping: ends within a microsecond or two of the deadline, at the price of a processor for so long.
     pub(crate) fn watch(&self, deadline: Instant) -> Wake<()> {
         loop {
             let now = Instant::now();

@@ -462,6 +462,7 @@ fn throughput() {
 
 /// Achieved minus commanded delay, as the emulator records it for every message.
 fn delay() {
+    bare_sleep();
     for (name, seconds) in [("5 ms", 0.005), ("100 ms", 0.1), ("1 s", 1.0)] {
         let emulated = Emulated::new(&format!("delay = {{ constant = {{ delay_s = {seconds:?} }} }}"), |_, _| {});
         paced(3000).for_each(|_| _ = emulated.send());
@@ -469,6 +470,22 @@ fn delay() {
         punctuality(name, &emulated.mission, &emulated.folder);
     }
     delay_with_everything();
+}
+
+/// What the machine itself makes of a thread that sleeps until an instant, with nothing else running.
+fn bare_sleep() {
+    bus::clock::sharpen_this_thread();
+    let begun = Instant::now();
+    let late = |turn: u32| {
+        let due = begun + Duration::from_millis(1) * turn;
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        (Instant::now() - due).as_secs_f64() * 1e6
+    };
+    let late = sorted((1..=3000).map(late).collect());
+    row(
+        "a thread that sleeps until an instant, alone: p50 / p99",
+        &format!("{:.0} / {:.0} µs late", percentile(&late, 0.5), percentile(&late, 0.99)),
+    );
 }
 
 /// The same with every model on that can be on together: four vehicles speak 250 times a second each.

@@ -22,8 +22,14 @@ const MAPS_IN_A_ROW: usize = 3;
 /// Colour of a cell without a value.
 const BLANK: &str = "#f1f2f3";
 
-/// What a dot with its band, or its bar, is.
-const INTERVAL: &str = "median, and its 95 % interval";
+/// What a dot with its band, or its bar, is; fewer than six runs have no interval.
+fn legend(points: &[(f64, Spread)]) -> &'static str {
+    match points.iter().filter(|(_, spread)| spread.sure.is_some()).count() {
+        0 => "median",
+        all if all == points.len() => "median, and its 95 % interval",
+        _ => "median, and its 95 % interval where there are six runs or more",
+    }
+}
 
 /// The picture of a sweep, if one, two or three keys are swept: a curve, a heat map, or a heat map for every value of the first
 /// key.
@@ -85,11 +91,11 @@ fn curve(plan: &Plan, cells: &[CellStatistics], measure: usize) -> Option<Drawin
     }
     let mut panel = Panel::default();
     match &numbers {
-        Some(_) => band(&mut panel, &points, 0, INTERVAL),
+        Some(_) => band(&mut panel, &points, 0, legend(&points)),
         None => intervals(&mut panel, &points),
     }
     // The axes follow from what is on the panel.
-    let layout = panel.layout(&plan.mission.name, &setting.key, about(measure)).with_subtitle(INTERVAL);
+    let layout = panel.layout(&plan.mission.name, &setting.key, about(measure)).with_subtitle(legend(&points));
     if numbers.is_some() {
         return Some(panel.laid_out(logarithmic(layout, &points)));
     }
@@ -295,7 +301,7 @@ mod tests {
         assert!(words.contains(">hold<") && words.contains(">advance<"), "{words}");
         let numbers = picture(&plan(&["coordination.gain=0.1,0.2"]), &cells(&medians), 0, "m").expect("a picture");
         for svg in [&words, &numbers] {
-            assert_eq!((svg.matches("<circle").count(), svg.contains(INTERVAL)), (2, true), "{svg}");
+            assert_eq!((svg.matches("<circle").count(), svg.contains(">median<")), (2, true), "{svg}");
         }
         let paths = |svg: &str| svg.matches("<path").count();
         assert!(paths(&words) < paths(&numbers), "{} {}", paths(&words), paths(&numbers));

@@ -43,8 +43,8 @@ pub struct Tolerance {
 const ROUNDING: f64 = 1e-9;
 
 impl Tolerance {
-    /// An envelope that decays as much more slowly and begins as much later: from `late` on what is tolerated of the first, but for
-    /// what may be added.
+    /// What is tolerated but for what may be added: an envelope that from `late` on is what the first is `late` earlier, decaying
+    /// more slowly; before, it is larger.
     pub fn of_decay(&self, envelope: &Envelope) -> Envelope {
         let rate = envelope.rate * (1.0 - self.slower);
         Envelope { rate, factor: envelope.factor * (rate * self.late).exp(), ..*envelope }
