@@ -464,6 +464,7 @@ mod tests {
             collected: false,
             pace: matches!(phase, Phase::Running | Phase::Finished | Phase::Aborted).then_some(Pace::Stepped),
             messages: [0; 4],
+            drops: [0; 8],
             counted_from: Time::ZERO,
         }
     }

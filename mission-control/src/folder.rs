@@ -214,6 +214,7 @@ pub fn report(folder: &Path) -> Result<(Summary, ClockSummary), String> {
     let theory = |summary: &Summary| Theory {
         rows: theory::rows(&mission, Some(summary)),
         envelope: theory::guarantee_of_flight(&mission, summary).map(|guarantee| (guarantee.rate, guarantee.factor)),
+        lost_its_rate: theory::lost_its_rate(&mission, summary),
     };
     write_run_folder(folder, &recording, &facts, theory, &account)
         .map_err(|error| format!("cannot write the report: {error}"))

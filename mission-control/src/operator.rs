@@ -125,6 +125,7 @@ mod tests {
             collected: false,
             pace: None,
             messages: [9, 4, 3, 2],
+            drops: [0, 0, 3, 0, 0, 0, 0, 0],
             counted_from: Time::ZERO,
         }
     }

@@ -563,6 +563,7 @@ mod tests {
             collected: true,
             pace: None,
             messages: [0; 4],
+            drops: [0; 8],
             counted_from: Time::ZERO,
         }
     }

@@ -1,7 +1,7 @@
 //! A directed link: what happens to the messages on it.
 
 use crate::network::{Delay, Loss, Range};
-use crate::time::Span;
+use crate::time::{Span, Time};
 
 /// One directed link.
 #[derive(Clone, Debug)]
@@ -46,7 +46,18 @@ impl Link {
         self.layers.iter().try_fold(Span::ZERO, |sum, layer| Some(sum + layer.delay.fixed()?))
     }
 
-    /// Whether messages can be lost although the link is up.
+    /// No message arrives later, and none is held back for longer by one before it: that came no later itself.
+    pub fn greatest_delay(&self) -> Span {
+        self.layers.iter().fold(Span::ZERO, |sum, layer| sum + layer.delay.greatest())
+    }
+
+    /// The most places that messages take at once, if one is said every `pause` up to `end`: of those before a message, what is due at
+    /// the very instant at which it is sent still has its place.
+    pub fn most_under_way(&self, pause: Span, end: Time) -> i64 {
+        self.greatest_delay().min(end - Time::ZERO).nanos() / pause.nanos().max(1) + 1
+    }
+
+    /// Whether messages can be lost although the link is up and has places for all.
     pub fn loses(&self) -> bool {
         self.corrupt > 0.0
             || self.range.is_limited()

@@ -181,7 +181,24 @@ impl Mission {
 
     /// Whether messages are lost by the switching of links only.
     pub fn loses_by_switching_only(&self) -> bool {
-        self.medium.is_none() && !self.links.iter().any(Link::loses)
+        self.medium.is_none() && !self.links.iter().any(|link| link.loses() || self.can_fill(link))
+    }
+
+    /// No vehicle speaks again sooner: the message period or, by event, the first at which the shortest silence is over.
+    pub fn shortest_pause(&self) -> Span {
+        let period = self.message_period();
+        let silence = self.talk.map_or(Span::ZERO, |trigger| trigger.least_silence());
+        period * ((silence.nanos() - 1).max(0) / period.nanos().max(1) + 1)
+    }
+
+    /// The most places of its queue that a link can need.
+    pub fn most_under_way(&self, link: &Link) -> i64 {
+        link.most_under_way(self.shortest_pause(), self.end)
+    }
+
+    /// Whether the queue of a link can be full when a message comes.
+    pub fn can_fill(&self, link: &Link) -> bool {
+        usize::try_from(self.most_under_way(link)).map_or(true, |most| most > link.queue)
     }
 
     /// The gain of this name (`gain`, `a` or `b`) of each vehicle, if the law is one under which vehicles may have their

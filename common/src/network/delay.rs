@@ -67,6 +67,20 @@ impl Delay {
         .clamp(Span::ZERO, LONGEST_DELAY)
     }
 
+    /// The most it can be: no message ever arrives later. However far it is, no message is under way for longer than
+    /// [`LONGEST_DELAY`].
+    pub fn greatest(&self) -> Span {
+        match self {
+            Delay::Constant(delay) => *delay,
+            // A uniform number is below one, and what is left of a nanosecond is cut off.
+            Delay::Uniform(least, most) if least < most => Span::from_nanos(most.nanos() - 1),
+            Delay::Uniform(_, most) => *most,
+            Delay::Drawn(quantiles) => Span::from_secs(quantiles.at(1.0f64.next_down())),
+            Delay::Distance { .. } => LONGEST_DELAY,
+        }
+        .clamp(Span::ZERO, LONGEST_DELAY)
+    }
+
     /// The delay that every message has, if they all have the same.
     pub fn fixed(&self) -> Option<Span> {
         match self {
@@ -167,11 +181,22 @@ mod tests {
         assert_eq!(delay.of(0.3, f64::NAN), Span::from_secs(0.1));
     }
 
+    #[test]
+    fn the_greatest_delay_is_one_that_occurs() {
+        let last = 1.0f64.next_down();
+        let uniform = Delay::Uniform(Span::from_secs(1.0), Span::from_secs(5.0));
+        for delay in [uniform, Delay::Constant(Span::from_secs(2.0)), Delay::gamma(2.0, 0.8, 0.5)] {
+            assert!(delay.of(last, 0.0) == delay.greatest(), "{}", delay.greatest());
+        }
+        let same = Delay::Uniform(Span::from_secs(3.0), Span::from_secs(3.0));
+        assert_eq!((same.greatest(), same.of(last, 0.0)), (Span::from_secs(3.0), Span::from_secs(3.0)));
+    }
+
     proptest! {
         /// What the stepped clock relies on.
         #[test]
-        fn nothing_arrives_before_the_least_delay_or_after_the_longest(
-            u in 0.0..1.0f64, mean in 0.0..100.0f64, deviation in 1e-6..100.0f64, least in 0.0..50.0f64,
+        fn nothing_arrives_before_the_least_delay_or_after_the_greatest(
+            u in prop_oneof![0.0..1.0f64, Just(1.0f64.next_down())], mean in 0.0..100.0f64, deviation in 1e-6..100.0f64, least in 0.0..50.0f64,
             distance in prop_oneof![0.0..1e9f64, Just(f64::NAN), Just(f64::INFINITY)],
         ) {
             for delay in [
@@ -182,7 +207,8 @@ mod tests {
             ] {
                 let span = delay.of(u, distance);
                 prop_assert!(span >= delay.least(), "{:?} < {:?} of {:?}", span, delay.least(), delay);
-                prop_assert!(span <= LONGEST_DELAY);
+                prop_assert!(span <= delay.greatest(), "{:?} > {:?} of {:?}", span, delay.greatest(), delay);
+                prop_assert!(delay.greatest() <= LONGEST_DELAY);
             }
         }
     }

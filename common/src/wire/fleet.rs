@@ -3,6 +3,7 @@
 use bincode::{Decode, Encode};
 
 use super::vehicle::{LogPiece, Phase};
+use crate::record::Fate;
 use crate::time::Time;
 
 /// How mission-control wants mission time to pass.
@@ -116,6 +117,8 @@ pub struct FleetStatus {
     pub pace: Option<Pace>,
     /// Messages taken, delivered, dropped and in flight, over all links.
     pub messages: [u64; 4],
+    /// What was dropped, by cause, in the order of [`Fate::DROPS`].
+    pub drops: [u64; Fate::DROPS.len()],
     /// From when on these are counted: zero, or when the network-emulator came back that was killed under way.
     pub counted_from: Time,
 }

@@ -27,6 +27,8 @@ pub struct Theory {
     pub rows: Vec<TheoryRow>,
     /// Rate \[1/s\] and, where it is known, factor of the envelope that it guarantees, with the network as measured.
     pub envelope: Option<(f64, Option<f64>)>,
+    /// Whether messages were dropped in the flight without which the fleet's rate is not as predicted.
+    pub lost_its_rate: bool,
 }
 
 /// Writes `summary.json`, `theory.json`, `clock.json`, `figures/*.svg` and `report.html` into a run folder. Each file appears whole
@@ -41,7 +43,8 @@ pub fn write_run_folder(
 ) -> io::Result<(Summary, ClockSummary)> {
     let directory = directory.as_ref();
     let (mut summary, clock) = (summarise(recording, facts), summarise_clock(recording));
-    let Theory { rows: theory, envelope } = theory(&summary);
+    let Theory { rows: theory, envelope, lost_its_rate } = theory(&summary);
+    summary.fleet.predicted_speed = summary.fleet.predicted_speed.filter(|_| !lost_its_rate);
     // What is drawn and compared is what is guaranteed for the network as it was, not as it was planned.
     let facts = &Facts {
         guaranteed_rate: envelope.map(|envelope| envelope.0),
@@ -130,7 +133,7 @@ mod tests {
                 ..TheoryRow::default()
             },
         ];
-        Theory { rows, envelope: Some((0.012, Some(1.3))) }
+        Theory { rows, envelope: Some((0.012, Some(1.3))), lost_its_rate: false }
     }
 
     fn write_fleet(directory: &Path, spatial: bool) -> Summary {
@@ -168,7 +171,7 @@ mod tests {
     fn the_envelope_of_the_measured_network_is_drawn_and_compared() {
         let directory = tempfile::tempdir().expect("directory");
         let write = |envelope| {
-            let said = |_: &Summary| Theory { rows: Vec::new(), envelope };
+            let said = |_: &Summary| Theory { envelope, ..Theory::default() };
             let (facts, account) = (facts(true), Account::default());
             let (summary, _) =
                 write_run_folder(directory.path(), &fleet(true), &facts, said, &account).expect("writes");

@@ -11,7 +11,7 @@ use super::learned_speeds::stuck_at_the_end;
 use super::premises::minds_no_hull;
 use super::steady_motion::{is_excited, motion};
 use super::talk::speed_factor;
-use crate::results::TheoryRow;
+use crate::results::{Summary, TheoryRow};
 
 pub(super) fn graph(case: &Case<'_>) -> TheoryRow {
     let graph = &case.network.graph;
@@ -116,7 +116,15 @@ pub fn predicted_speed(mission: &Mission, v_l: f64) -> Option<f64> {
     rate_in_the_end(&Case::new(mission, None), v_l).ok()
 }
 
-/// The same, or why there is none.
+/// Whether messages were dropped in the flight without which the fleet's rate is not as it was predicted.
+pub fn lost_its_rate(mission: &Mission, summary: &Summary) -> bool {
+    Case::new(mission, Some(summary)).dropped.is_some_and(|dropped| {
+        let case = Case { dropped: Some(dropped), ..Case::new(mission, None) };
+        rate_in_the_end(&case, v_l_at_the_end(&case)).is_err()
+    })
+}
+
+/// The predicted rate, or why there is none.
 pub(super) fn rate_in_the_end(case: &Case<'_>, v_l: f64) -> Result<f64, String> {
     let (mission, disturbed) = (case.mission, &case.disturbances);
     match travels(mission) {

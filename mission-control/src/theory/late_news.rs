@@ -48,11 +48,12 @@ const ESTIMATED: &str = "v_L* is estimated on board, and no theorem says how wel
 /// Whether (4.42) with an estimate is (4.34) with the delay that all messages have: nobody is ever alone, and the estimate never used.
 pub(super) fn is_4_34(case: &Case<'_>) -> bool {
     let at_once = common_delay(case.mission).is_some_and(|tau| late_or_lost(case.mission, tau).is_none());
-    at_once && case.network.leaves_nobody_alone()
+    at_once && case.network.leaves_nobody_alone() && case.dropped.is_none()
 }
 
 fn nothing_else(case: &Case<'_>, told: Span) -> Result<(), String> {
-    late_or_lost(case.mission, told).map_or(Ok(()), |premise| Err(format!("{NOT_SO_LATE}: {}", premise.found)))
+    let broken = late_or_lost(case.mission, told).or_else(|| case.dropped.clone());
+    broken.map_or(Ok(()), |premise| Err(format!("{NOT_SO_LATE}: {}", premise.found)))
 }
 
 /// What is held grows older until the next word.

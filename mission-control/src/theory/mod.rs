@@ -53,9 +53,10 @@ use common::mission::Mission;
 use common::mission::file::LawChoice;
 use common::theory::Verdict;
 use common::theory::linear_coordination::{Late, Law};
+use common::theory::monitor::Premise;
 
 pub use figures::figures;
-pub use fleet::predicted_speed;
+pub use fleet::{lost_its_rate, predicted_speed};
 pub use graph::graph_facts;
 pub use so_far::{SoFar, so_far};
 pub use steady_motion::predicted_biases;
@@ -82,12 +83,16 @@ struct Case<'a> {
     summary: Option<&'a Summary>,
     way: Way,
     disturbances: Disturbances,
+    /// The premise that messages which were dropped in the flight, and not for links that were down, do not meet.
+    dropped: Option<Premise>,
 }
 
 impl<'a> Case<'a> {
     fn new(mission: &'a Mission, summary: Option<&'a Summary>) -> Case<'a> {
         let (way, disturbances) = (Way::of(mission), Disturbances::of(mission, summary));
-        Case { mission, network: Network::of(mission), summary, way, disturbances }
+        let counts = summary.map(|summary| summary.fleet.messages.counts);
+        let dropped = counts.and_then(|counts| premises::dropped(mission, counts.sent, |fate| counts.met(fate)));
+        Case { mission, network: Network::of(mission), summary, way, disturbances, dropped }
     }
 
     /// A measured value in words, or a dash before the flight and if nothing was recorded.

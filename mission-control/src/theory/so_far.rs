@@ -2,6 +2,7 @@
 
 use common::coordination::disagreement;
 use common::mission::Mission;
+use common::record::Fate;
 use common::theory::monitor::{self, Envelope, Margin, Premise, Seen};
 use common::time::{Span, Time};
 use common::wire::fleet::FleetStatus;
@@ -10,7 +11,7 @@ use serde::Serialize;
 use vehicle_node::node::STOPPED;
 
 use super::network::Network;
-use super::premises::{looked_for, planned_exchange, tolerance};
+use super::premises::{dropped, looked_for, planned_exchange, tolerance};
 use super::watched::network_words;
 use crate::console::{error_in_words, short};
 
@@ -68,7 +69,7 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
     }
     let network = Network::of(&flown);
     let planned = Seen::of(&network.planned)?;
-    let missing = missing(mission, status);
+    let missing: Vec<Premise> = missing(mission, status).into_iter().chain(dropped_so_far(mission, status)).collect();
     let norm = |states: Vec<f64>| disagreement::of_fleet(states.into_iter());
     let states = now(mission, status);
     let largest = states.as_ref().map(|states| largest_difference(states));
@@ -76,14 +77,10 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
     let errors_now = error.zip(largest);
     let Some(looked) = looked_for(&flown, &network) else {
         let names = "Theorems 4.4 and 4.5 and Lemma 4.7 do not speak of this law; the report says what does";
-        let verdict = missing.as_ref().map_or(names.to_string(), |premise| format!("not covered: {premise}"));
-        let watch = monitor::Watch {
-            seen: planned,
-            margins: Vec::new(),
-            broken: missing.into_iter().collect(),
-            covered_by: None,
-            envelope: None,
-        };
+        let found: Vec<String> = missing.iter().map(ToString::to_string).collect();
+        let verdict = if found.is_empty() { names.to_string() } else { format!("not covered: {}", found.join("; ")) };
+        let watch =
+            monitor::Watch { seen: planned, margins: Vec::new(), broken: missing, covered_by: None, envelope: None };
         return Some(said(&watch, flown.end, initial_error, errors_now, None, verdict));
     };
     let exchange = planned_exchange(&flown, &network);
@@ -170,6 +167,13 @@ fn missing(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
     (!found.is_empty()).then(|| Premise { asks: "every vehicle all the time", found: found.join(", ") })
 }
 
+/// The premise that messages which the network dropped so far, and not for links that were down, do not meet.
+fn dropped_so_far(mission: &Mission, status: &FleetStatus) -> Option<Premise> {
+    let met =
+        |fate| Fate::DROPS.iter().zip(status.drops).find(|(cause, _)| **cause == fate).map_or(0, |(_, count)| count);
+    dropped(mission, status.messages[0], met)
+}
+
 fn largest_difference(states: &[f64]) -> f64 {
     let (least, most) = states.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     most - least
@@ -220,6 +224,7 @@ mod tests {
             vehicles: vehicles.collect(),
             collected: false,
             messages: [0; 4],
+            drops: [0; 8],
             counted_from: Time::ZERO,
             pace: None,
         };
@@ -244,6 +249,26 @@ mod tests {
         let (mission, far) = at(60.0, [10.0, 30.0, 90.0], [true; 3]);
         let so_far = super::so_far(&mission, &far).expect("time has passed");
         assert!(so_far.verdict.starts_with("a defect"), "{}", so_far.verdict);
+    }
+
+    #[test]
+    fn what_was_dropped_is_a_broken_premise() {
+        let (mission, mut status) = at(60.0, [30.0, 30.1, 30.2], [true; 3]);
+        status.messages = [981, 40, 932, 9];
+        let drops = |full: u64| {
+            Fate::DROPS.map(|cause| match cause {
+                Fate::QueueFull => full,
+                Fate::LinkDown => 50,
+                _ => 0,
+            })
+        };
+        status.drops = drops(0);
+        assert_eq!(so_far(&mission, &status).and_then(|so_far| so_far.covered_by), Some("Theorem 4.4"));
+        status.drops = drops(882);
+        let dropped = so_far(&mission, &status).expect("time has passed");
+        let words = "882 of 981 messages were dropped for other reasons: queue full";
+        assert!(dropped.covered_by.is_none() && dropped.verdict.contains(words), "{dropped}");
+        assert!(dropped.broken.iter().any(|premise| premise.found == words), "{dropped:?}");
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub(super) fn motion(case: &Case<'_>, v_l: f64) -> Result<SteadyMotion, String> 
     let vehicles: Option<Vec<Settling>> = (0..mission.vehicles.len()).map(|i| settling(case, i, v_l)).collect();
     let vehicles = vehicles.ok_or("no statement about the steady rate of targets with α₂ under this law")?;
     // Vehicles that are alike agree, and who agrees does not mind who is heard; but who hears late goes at another rate when alone.
-    let fixed = network.graphs.len() == 1 && mission.loses_by_switching_only();
+    let fixed = network.graphs.len() == 1 && mission.loses_by_switching_only() && case.dropped.is_none();
     if !fixed && (lag != 0.0 || !alike(&vehicles)) {
         return Err("the network changes, and with it what late or unequal vehicles are asked for".into());
     }

@@ -11,6 +11,7 @@ use common::theory::{delay, event_triggered, known_delay};
 use common::time::Span;
 
 use super::late_news::is_4_34;
+use super::premises::lost;
 use super::switching::moves_as_told;
 use super::{Case, delayed};
 use crate::results::TheoryRow;
@@ -51,11 +52,12 @@ pub(super) fn rows_of_known_delay(case: &Case<'_>, law: &KnownDelay) -> Vec<Theo
     let late = oldest_news(mission);
     let statement = late.as_deref().map(|late| of_delays(mission, &network.graph, law.gain, late));
     let connected = network.graph.is_undirected() && network.graph.is_connected();
-    let whole = mission.talk.is_none() && mission.loses_by_switching_only();
+    let lost = lost_in_words(mission);
     let lacks = [
         (network.graphs.len() == 1, "the network changes"),
         (connected, "one-way links, or not connected"),
-        (whole, "messages are lost, or not said"),
+        (lost.is_empty(), &lost),
+        (mission.talk.is_none(), "vehicles speak by event, not all the time"),
         (late.is_some(), "a delay has no bound"),
         (
             late.iter().flatten().all(|link| link.oldest.secs() <= law.longest_s),
@@ -176,9 +178,10 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
         .and_then(|(oldest, gain)| event_triggered::ultimate_bound(&network.graph, gain, trigger.floor(), oldest));
     let loop_gain =
         of_beliefs.and_then(|(oldest, gain)| Some((oldest, event_triggered::loop_gain(&network.graph, gain, oldest)?)));
+    let lost = lost_in_words(mission);
     let premises = [
         (network.graphs.len() == 1, "the network changes"),
-        (mission.loses_by_switching_only(), "messages are lost"),
+        (lost.is_empty(), lost.as_str()),
         (mission.between == Between::Advance, "beliefs do not move on at v_L"),
         (goes_as_told(case), NOT_AS_TOLD),
     ];
@@ -208,6 +211,14 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
         measured: case.measured(|s| format!("{:.4} in the steady part", s.fleet.coordination.steady_rms)),
         ..TheoryRow::default()
     })
+}
+
+/// How messages can be lost, if they can.
+fn lost_in_words(mission: &Mission) -> String {
+    match lost(mission) {
+        ways if ways.is_empty() => String::new(),
+        ways => format!("messages are lost: {}", ways.join(", ")),
+    }
 }
 
 /// How many links go one way only, if any does.

@@ -6,11 +6,12 @@
 use common::graph::Graph;
 use common::mission::Mission;
 use common::mission::file::LawChoice;
+use common::record::Fate;
 use common::theory::monitor::{self, Envelope, Exchange, Judgement, Margin, Premise, Seen, Tolerance, Watch, Watched};
 use common::time::Span;
 
 use super::network::Network;
-use super::premises::{Looked, age, looked_for, tolerance};
+use super::premises::{Looked, age, dropped, looked_for, tolerance};
 use super::{Case, Guarantee, guarantee_of, law_rows};
 use crate::results::{Absence, Connectivity, FleetSummary, Summary, TheoryRow};
 
@@ -25,7 +26,7 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
     else {
         return Some(nothing_seen());
     };
-    let broken = looked.broken.iter().cloned().chain(not_there(&summary.fleet)).collect();
+    let broken = looked.broken.iter().cloned().chain(missing(case)).collect();
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
     let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
     let judged = watch.judge(&errors(summary, f64::INFINITY), tolerance);
@@ -50,10 +51,10 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
 pub fn guarantee_of_flight(mission: &Mission, summary: &Summary) -> Option<Guarantee> {
     let case = Case::new(mission, Some(summary));
     let Some(looked) = looked_for(mission, &case.network) else {
-        return guarantee_of(&case).filter(|_| not_there(&summary.fleet).is_empty());
+        return guarantee_of(&case).filter(|_| missing(&case).is_empty());
     };
     let seen = seen(mission, summary.fleet.connectivity.as_ref()?, &looked)?;
-    let broken = looked.broken.iter().cloned().chain(not_there(&summary.fleet)).collect();
+    let broken = looked.broken.iter().cloned().chain(missing(&case)).collect();
     let envelope = monitor::watch(&looked.watched, &case.network.graphs, seen, broken).envelope?;
     Some(Guarantee { rate: envelope.rate, factor: Some(envelope.factor) }).filter(|guarantee| guarantee.rate > 0.0)
 }
@@ -141,13 +142,20 @@ fn not_there(fleet: &FleetSummary) -> Vec<Premise> {
     absent(&fleet.absences).into_iter().chain(unrecorded).chain(gave_up).collect()
 }
 
-/// The row of a statement about the whole fleet: it does not cover a flight in which a vehicle was away.
-pub(super) fn with_everyone(case: &Case<'_>, row: TheoryRow) -> TheoryRow {
+/// The premises of every statement that the flight did not meet: every vehicle all the time, and every word that was said.
+fn missing(case: &Case<'_>) -> Vec<Premise> {
     let away = case.summary.map(|summary| not_there(&summary.fleet)).unwrap_or_default();
-    if away.is_empty() || row.holds != Some(true) {
+    away.into_iter().chain(case.dropped.clone()).collect()
+}
+
+/// The row of a statement about the whole fleet: it does not cover a flight in which a vehicle was away, or in which messages were
+/// dropped that the plan does not know to be.
+pub(super) fn with_everyone(case: &Case<'_>, row: TheoryRow) -> TheoryRow {
+    let missing = missing(case);
+    if missing.is_empty() || row.holds != Some(true) {
         return row;
     }
-    let found: Vec<String> = away.into_iter().map(|premise| premise.found).collect();
+    let found: Vec<String> = missing.into_iter().map(|premise| premise.found).collect();
     TheoryRow { value: format!("{}; {}", row.value, found.join("; ")), holds: Some(false), ..row }
 }
 
@@ -176,7 +184,11 @@ fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
     let summary = case.summary?;
     let first = summary.fleet.absences.first().filter(|_| unrecorded(&summary.fleet).is_empty())?;
     let seen = seen(case.mission, summary.fleet.connectivity_before.as_ref()?, looked)?;
-    let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, looked.broken.clone());
+    // What had nobody to receive it was dropped later. Of other drops it is not known when they were.
+    let counts = summary.fleet.messages.counts;
+    let before = |fate| if fate == Fate::ReceiverAbsent { 0 } else { counts.met(fate) };
+    let broken = looked.broken.iter().cloned().chain(dropped(case.mission, counts.sent, before)).collect();
+    let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
     let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
     let judged = watch.judge(&errors(summary, first.from_s), tolerance);
     Some(format!("; judged until {:.1} s alone: {judged}", first.from_s))
@@ -186,7 +198,7 @@ fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
 fn of_other_laws(case: &Case<'_>) -> TheoryRow {
     let rows = law_rows(case);
     let spoken: Vec<&TheoryRow> = rows.iter().filter(|row| row.holds.is_some()).collect();
-    let absent = case.summary.map(|summary| not_there(&summary.fleet)).unwrap_or_default();
+    let absent = missing(case);
     let values: Vec<&str> = spoken.iter().map(|row| row.value.as_str()).collect();
     let names = spoken.iter().map(|row| row.name.as_str()).collect::<Vec<_>>().join("; ");
     let failing: Vec<String> = absent
@@ -340,7 +352,7 @@ mod tests {
         );
         let type_1 = ("kind = \"II\"", "kind = \"I\"");
         for (text, changes, words) in [
-            (HELIX, vec![short, delay], "they take 1.000 s, 0.5000 of them are lost"),
+            (HELIX, vec![short, delay], "they take 1.000 s (told: 5.000 s, 4.000 s less), 0.5000 of them are lost"),
             (HELIX, vec![short, type_1], "auv1 has dynamics of its own (type I, (4.53))"),
             (BRIEF_LOSSES, vec![type_1], "Theorem 4.4 (type I): ρ₁/(α₁λ₁) must be below 0.1111"),
             (

@@ -26,6 +26,11 @@ impl Emulator {
         self.ledgers().fold([0; 4], add)
     }
 
+    /// What was dropped over all links, by cause, in the order of [`Fate::DROPS`].
+    pub fn drops(&self) -> [u64; Fate::DROPS.len()] {
+        Fate::DROPS.map(|cause| self.ledgers().map(|ledger| ledger.of(cause)).sum())
+    }
+
     /// Garbage counted per vehicle.
     pub fn garbage(&self) -> &[GarbageCount] {
         &self.garbage

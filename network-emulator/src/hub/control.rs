@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use common::mission::{FASTEST_FORMATION, Mission};
-use common::record::{ClockRecord, NoteRow, Row};
+use common::record::{ClockRecord, Fate, NoteRow, Row};
 use common::time::{Span, Time};
 use common::wire::fleet::{FleetStatus, FromFleet, Pace, ToFleet, VehicleStatus};
 use common::wire::vehicle::{ClockPlan, LogPiece, Phase, SpeedCommand, ToVehicle};
@@ -88,6 +88,7 @@ impl Hub {
                 ClockPlan::Stepped => Pace::Stepped,
             }),
             messages: self.totals(),
+            drops: load.map_or([0; Fate::DROPS.len()], |load| load.emulator.drops()),
             counted_from: load.map_or(Time::ZERO, |load| load.counted_from),
         };
         self.answer(FromFleet::Status(status));

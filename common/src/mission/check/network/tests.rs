@@ -247,6 +247,49 @@ fn the_least_delay_is_of_all_layers_and_none_on_a_shared_medium() {
 }
 
 #[test]
+fn a_queue_can_be_full_if_more_than_its_places_can_be_under_way() {
+    let full = |network: &str, queue: usize| {
+        let mission = mission(&format!("{network}\nqueue = {queue}"));
+        assert_eq!(mission.loses_by_switching_only(), !mission.can_fill(&mission.links[0]), "{network}");
+        mission.can_fill(&mission.links[0])
+    };
+    // Every 0.1 s. What is due at the very instant at which another is sent still has its place.
+    for (network, needed) in [
+        ("delay = { constant = { delay_s = 0.0 } }", 1),
+        ("delay = { constant = { delay_s = 0.099999999 } }", 1),
+        ("delay = { constant = { delay_s = 0.1 } }", 2),
+        ("delay = { constant = { delay_s = 5.0 } }", 51),
+        ("delay = { constant = { delay_s = 4.9 } }\nalso = [{ delay = { constant = { delay_s = 0.1 } } }]", 51),
+        // Up to 0.5 s, and never just that.
+        ("delay = { jittered = { min_s = 0.1, max_s = 0.5 } }", 5),
+        ("delay = { jittered = { min_s = 0.1, max_s = 0.5 } }\norder = \"in_order\"", 5),
+        // The farthest takes an hour, and the mission is over after 800 s.
+        ("delay = { distance = { speed_mps = 1500.0 } }", 8001),
+    ] {
+        assert!(!full(network, needed), "{needed} places will do for {network}");
+        assert!(needed == 1 || full(network, needed - 1), "{needed} places are needed for {network}");
+    }
+    let normal = "delay = { normal = { mean_s = 2.0, deviation_s = 0.5 } }";
+    assert!(full(normal, 20) && !full(normal, 100), "nine deviations are the most that is drawn");
+}
+
+#[test]
+fn the_shortest_silence_is_the_first_message_period_after_it() {
+    let pause = |least: &str| {
+        let talk = format!(
+            "message_period_s = 0.1\ntalk = {{ event_triggered = {{ threshold = 0.1, most_silence_s = 9.0{least} }} }}\n"
+        );
+        let text =
+            HELIX.replacen("message_period_s = 0.1\n", &talk, 1).replace("validity_s = 0.3", "validity_s = 10.0");
+        Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")).shortest_pause().secs()
+    };
+    assert_eq!(pause(""), 0.1);
+    for (least, first) in [(0.05, 0.1), (0.1, 0.1), (0.11, 0.2), (2.0, 2.0), (2.01, 2.1)] {
+        assert!((pause(&format!(", least_silence_s = {least}")) - first).abs() < 1e-9, "{least}");
+    }
+}
+
+#[test]
 fn a_trace_says_when_links_are_up() {
     let link = |from: &str, to: &str, up: &str| format!("{{ from = \"{from}\", to = \"{to}\", up_s = {up} }}");
     let links = [
