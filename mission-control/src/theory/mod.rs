@@ -49,8 +49,8 @@ mod together;
 mod watched;
 mod weights_and_patterns;
 
-use common::mission::Mission;
 use common::mission::file::LawChoice;
+use common::mission::{Mission, SpeedProfile};
 use common::theory::Verdict;
 use common::theory::linear_coordination::{Late, Law};
 
@@ -88,6 +88,11 @@ impl<'a> Case<'a> {
     fn new(mission: &'a Mission, summary: Option<&'a Summary>) -> Case<'a> {
         let (way, disturbances) = (Way::of(mission), Disturbances::of(mission, summary));
         Case { mission, network: Network::of(mission), summary, way, disturbances }
+    }
+
+    /// The formation speed as flown; before a flight, as planned.
+    fn speed(&self) -> SpeedProfile {
+        flown_speed(self.mission, self.summary)
     }
 
     /// A measured value in words, or a dash before the flight and if nothing was recorded.
@@ -147,6 +152,11 @@ impl<'a> Case<'a> {
     fn held_rate(&self) -> Option<f64> {
         solutions::late_rate(self, Late::held(self.mission.control_period.secs()))
     }
+}
+
+/// The formation speed as flown; without a flight, as planned.
+fn flown_speed(mission: &Mission, summary: Option<&Summary>) -> SpeedProfile {
+    summary.map_or_else(|| mission.speed.clone(), |summary| mission.speed.as_recorded(&summary.fleet.speeds))
 }
 
 /// The slowest mode in words: a root that occurs several times is no rate itself.
