@@ -460,6 +460,7 @@ mod tests {
             now: Time::ZERO,
             end: Time::from_secs(800.0),
             speed: 0.5,
+            speed_since: Time::ZERO,
             vehicles: ["auv1", "auv2", "auv3"].map(vehicle).into(),
             collected: false,
             pace: matches!(phase, Phase::Running | Phase::Finished | Phase::Aborted).then_some(Pace::Stepped),

@@ -23,11 +23,7 @@ pub fn speed_in_force(mission: &Mission, exact: &[Record], t: Time) -> f64 {
         Record::Speed(row) => Some(SpeedCommand { at: Time::from_nanos(row.t_ns), speed: row.speed }),
         _ => None,
     });
-    let mut commands: Vec<SpeedCommand> = rows.filter(|row| !mission.speed.steps().contains(row)).collect();
-    commands.sort_by_key(|command| command.at);
-    let mut profile = mission.speed.clone();
-    commands.into_iter().for_each(|command| profile.command(command));
-    profile.at(t).v_l
+    mission.speed.as_recorded(&rows.collect::<Vec<_>>()).at(t).v_l
 }
 
 /// The formation speeds that were commanded in a recorded flight, in order of time: from when on \[s\], and what. Those that its file

@@ -121,6 +121,7 @@ mod tests {
             now: Time::from_secs(212.7),
             end: Time::from_secs(800.0),
             speed: 0.5,
+            speed_since: Time::ZERO,
             vehicles: vec![vehicle("auv1", true, Some((212.6, 91.25))), vehicle("auv3", false, Some((200.4, 87.2)))],
             collected: false,
             pace: None,

@@ -559,6 +559,7 @@ mod tests {
             now: Time::from_secs(now_s),
             end: Time::from_secs(800.0),
             speed: 0.5,
+            speed_since: Time::ZERO,
             vehicles: Vec::new(),
             collected: true,
             pace: None,

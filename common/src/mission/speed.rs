@@ -53,6 +53,27 @@ impl SpeedProfile {
         sum
     }
 
+    /// The profile of a flight in which these speeds were recorded: those that are not planned are commands.
+    pub fn as_recorded(&self, recorded: &[SpeedCommand]) -> SpeedProfile {
+        let mut commands: Vec<SpeedCommand> =
+            recorded.iter().filter(|row| !self.steps.contains(row)).copied().collect();
+        commands.sort_by_key(|command| command.at);
+        let mut profile = self.clone();
+        commands.into_iter().for_each(|command| profile.command(command));
+        profile
+    }
+
+    /// The steps under way, after the start and before `end`, that ask for another speed than before: when, and by how much more.
+    pub fn changes(&self, end: Time) -> Vec<(Time, f64)> {
+        let pairs = self.steps.windows(2).map(|pair| (pair[1].at, pair[1].speed - pair[0].speed));
+        pairs.filter(|(at, more)| *more != 0.0 && *at > Time::ZERO && *at < end).collect()
+    }
+
+    /// Since when the speed at `t` holds: zero, if it never changed under way.
+    pub fn last_change(&self, t: Time) -> Time {
+        self.changes(t).last().map_or(Time::ZERO, |(at, _)| *at)
+    }
+
     /// Largest speed that it ever asks for, without sign.
     pub fn fastest(&self) -> f64 {
         self.steps.iter().map(|step| step.speed.abs()).fold(0.0, f64::max)
@@ -73,6 +94,25 @@ mod tests {
         assert_eq!(profile.at(Time::from_secs(9.999)).v_l, 0.5);
         assert_eq!(profile.at(Time::from_secs(10.0)).v_l, 0.2);
         assert!((profile.distance(Time::from_secs(20.0)) - 7.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_change_is_another_speed_under_way() {
+        let profile = SpeedProfile::new(vec![at(-1.0, 0.1), at(0.0, 0.5), at(5.0, 0.5), at(10.0, 0.25), at(20.0, 0.5)]);
+        let by_hand = [(Time::from_secs(10.0), -0.25), (Time::from_secs(20.0), 0.25)];
+        assert_eq!(profile.changes(Time::from_secs(20.5)), by_hand);
+        assert_eq!(profile.changes(Time::from_secs(20.0)), by_hand[..1], "at the end it changes nothing any more");
+        assert_eq!(profile.last_change(Time::from_secs(20.0)), Time::from_secs(10.0));
+        assert_eq!(profile.last_change(Time::from_secs(9.0)), Time::ZERO);
+    }
+
+    #[test]
+    fn what_is_recorded_and_not_planned_is_a_command() {
+        let profile = SpeedProfile::new(vec![at(0.0, 0.5), at(10.0, 0.2)]);
+        assert_eq!(profile.as_recorded(profile.steps()), profile);
+        // A command at 5 s replaces the step at 10 s, in whichever order rows come.
+        let flown = profile.as_recorded(&[at(7.0, 0.3), at(0.0, 0.5), at(5.0, 0.1), at(10.0, 0.2)]);
+        assert_eq!(flown.steps(), [at(0.0, 0.5), at(5.0, 0.1), at(7.0, 0.3)]);
     }
 
     #[test]

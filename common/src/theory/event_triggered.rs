@@ -20,6 +20,15 @@
 //! ```
 //!
 //! if the denominator is positive (a small gain). This is for beliefs that move at v_L, and for messages that arrive.
+//!
+//! When v_L changes by Δ, a belief that is a old is wrong by |Δ|a at once, until the others use what is said of it then: for σ,
+//! while ‖γ~‖ comes nearer to what such beliefs would cost in the end, g|Δ|a/(1 − σk(λ_max g + d)), at most at the rate kλ_2. So it adds up to
+//!
+//! ```text
+//! σkλ_2 g|Δ|a/(1 − σk(λ_max g + d))
+//! ```
+//!
+//! to ‖γ~‖, of which e^{−kλ_2 t} is left after t. As the bound, this is of first order in σ.
 
 use nalgebra::DMatrix;
 
@@ -57,9 +66,24 @@ pub fn ultimate_bound(graph: &Graph, k: f64, threshold: f64, staleness: f64) -> 
     Some(gain(graph)? * belief_error(graph, k, threshold, staleness)?)
 }
 
+/// What a change of v_L adds to ‖γ~‖ at most, of which beliefs are wrong by `wrong` for as long as `staleness`; `None` as [`belief_error`].
+pub fn added_by_a_change(graph: &Graph, k: f64, wrong: f64, staleness: f64) -> Option<f64> {
+    Some(staleness * k * lambda_2(graph)? * ultimate_bound(graph, k, wrong, staleness)?)
+}
+
+/// e^{−kλ_2 t}: what is left of ‖γ~‖ after this time, beside what wrong beliefs cost.
+pub fn left_after(graph: &Graph, k: f64, t: f64) -> Option<f64> {
+    Some((-k * lambda_2(graph)? * t).exp())
+}
+
+/// ln(1/part)/(kλ_2): after which time this part of ‖γ~‖ is left.
+pub fn time_until(graph: &Graph, k: f64, part: f64) -> Option<f64> {
+    Some(-part.ln() / (k * lambda_2(graph)?))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{belief_error, gain, loop_gain, ultimate_bound};
+    use super::{added_by_a_change, belief_error, gain, left_after, loop_gain, time_until, ultimate_bound};
     use crate::graph::Graph;
     use proptest::prelude::*;
 
@@ -89,6 +113,17 @@ mod tests {
             (belief_error(&pair(), 0.1, 1.0, 1.0).expect("bounded") - 1.0 / (1.0 - 0.1 * (2f64.sqrt() + 1.0))).abs()
                 < 1e-9
         );
+    }
+
+    #[test]
+    fn what_a_change_of_v_l_adds_by_hand() {
+        // A pair: λ_2 = 2, g = 1/√2, λ_max g + d = √2 + 1.
+        let room = 1.0 - 0.5 * 0.1 * (2f64.sqrt() + 1.0);
+        let by_hand = 0.5 * 0.1 * 2.0 * 0.5f64.sqrt() * 3.0 / room;
+        assert!((added_by_a_change(&pair(), 0.1, 3.0, 0.5).expect("bounded") - by_hand).abs() < 1e-12);
+        assert!((left_after(&pair(), 0.1, 5.0).expect("connected") - (-1f64).exp()).abs() < 1e-12);
+        assert!((time_until(&pair(), 0.1, (-1f64).exp()).expect("connected") - 5.0).abs() < 1e-9);
+        assert_eq!(added_by_a_change(&pair(), 1.0, 3.0, 10.0), None, "too stale");
     }
 
     #[test]

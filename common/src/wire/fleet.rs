@@ -109,6 +109,8 @@ pub struct FleetStatus {
     pub end: Time,
     /// Present formation speed.
     pub speed: f64,
+    /// Since when it holds: zero, if it never changed under way.
+    pub speed_since: Time,
     /// Vehicles of the mission, and others that are connected.
     pub vehicles: Vec<VehicleStatus>,
     /// Whether the logs of a flight that is over have been collected.

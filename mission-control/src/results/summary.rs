@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use bus::recording::Recording;
 use common::record::{ClockRecord, Record};
+use common::time::Time;
+use common::wire::vehicle::SpeedCommand;
 use network_emulator::hub::ASLEEP;
 use serde::Serialize;
 
@@ -59,6 +61,9 @@ pub struct FleetSummary {
     pub formation_speed: Option<f64>,
     /// The formation speed in force at the end, which the prediction is about.
     pub formation_speed_at_the_end: Option<f64>,
+    /// The formation speeds as recorded, planned and commanded, in order of time. They are in the recording, and not in `summary.json`.
+    #[serde(skip)]
+    pub speeds: Vec<SpeedCommand>,
     /// Largest path-following error of any vehicle at the end \[m\].
     pub path_error_final_m: f64,
     /// When the last vehicle was on its path to stay, within 0.1 m \[s\].
@@ -124,6 +129,10 @@ pub fn summarise(recording: &Recording, facts: &Facts) -> Summary {
         predicted_speed: facts.predicted_speed,
         formation_speed: speeds(exact).last().map(|row| row.speed),
         formation_speed_at_the_end: facts.formation_speed_at_the_end,
+        speeds: speeds(exact)
+            .iter()
+            .map(|row| SpeedCommand { at: Time::from_nanos(row.t_ns), speed: row.speed })
+            .collect(),
         path_error_final_m: largest(present().map(|vehicle| vehicle.path_error_final_m)),
         on_path_s: present()
             .map(|vehicle| vehicle.on_path_s)

@@ -49,8 +49,8 @@ mod together;
 mod watched;
 mod weights_and_patterns;
 
-use common::mission::Mission;
 use common::mission::file::LawChoice;
+use common::mission::{Mission, SpeedProfile};
 use common::theory::Verdict;
 use common::theory::linear_coordination::{Late, Law};
 use common::theory::monitor::Premise;
@@ -93,6 +93,11 @@ impl<'a> Case<'a> {
         let counts = summary.map(|summary| summary.fleet.messages.counts);
         let dropped = counts.and_then(|counts| premises::dropped(mission, counts.sent, |fate| counts.met(fate)));
         Case { mission, network: Network::of(mission), summary, way, disturbances, dropped }
+    }
+
+    /// The formation speed as flown; before a flight, as planned.
+    fn speed(&self) -> SpeedProfile {
+        flown_speed(self.mission, self.summary)
     }
 
     /// A measured value in words, or a dash before the flight and if nothing was recorded.
@@ -152,6 +157,11 @@ impl<'a> Case<'a> {
     fn held_rate(&self) -> Option<f64> {
         solutions::late_rate(self, Late::held(self.mission.control_period.secs()))
     }
+}
+
+/// The formation speed as flown; without a flight, as planned.
+fn flown_speed(mission: &Mission, summary: Option<&Summary>) -> SpeedProfile {
+    summary.map_or_else(|| mission.speed.clone(), |summary| mission.speed.as_recorded(&summary.fleet.speeds))
 }
 
 /// The slowest mode in words: a root that occurs several times is no rate itself.

@@ -2,7 +2,7 @@
 
 use common::graph::Graph;
 use common::mission::file::{Between, FollowingChoice, FollowingType, LawChoice};
-use common::mission::{Link, Mission};
+use common::mission::{Link, Mission, SpeedProfile};
 use common::network::Delay;
 use common::record::Fate;
 use common::theory::PathFollowing;
@@ -74,8 +74,14 @@ pub(super) fn age(mission: &Mission, oldest: Span) -> Span {
 }
 
 /// What messages in periods may cost at most: how fast a neighbour seems to fall behind, and what rounding leaves.
-pub(super) fn tolerance(mission: &Mission, graphs: &[Graph], watch: &Watch, watched: &Watched) -> Tolerance {
-    let fastest = mission.speed.fastest();
+pub(super) fn tolerance(
+    mission: &Mission,
+    speed: &SpeedProfile,
+    graphs: &[Graph],
+    watch: &Watch,
+    watched: &Watched,
+) -> Tolerance {
+    let fastest = speed.fastest();
     let drift = if mission.between == Between::Hold { fastest } else { 0.0 };
     let furthest = mission.vehicles.iter().map(|plan| plan.start.xi.abs()).fold(0.0, f64::max);
     let tolerance = watch.tolerance(watched, graphs, drift);

@@ -6,7 +6,7 @@ use common::record::Fate;
 use common::theory::monitor::{self, Envelope, Margin, Premise, Seen};
 use common::time::{Span, Time};
 use common::wire::fleet::FleetStatus;
-use common::wire::vehicle::Phase;
+use common::wire::vehicle::{Phase, SpeedCommand};
 use serde::Serialize;
 use vehicle_node::node::STOPPED;
 
@@ -45,7 +45,7 @@ pub struct SoFar {
     pub error: Option<f64>,
     /// max |x_i − x_j| now, likewise.
     pub largest: Option<f64>,
-    /// What the envelope allows now.
+    /// What the envelope allows now; `None` once v_L has changed.
     pub allowed: Option<f64>,
     /// All of this in words.
     pub verdict: String,
@@ -87,17 +87,28 @@ pub fn so_far(mission: &Mission, status: &FleetStatus) -> Option<SoFar> {
     let seen = Seen { exchange: Some(exchange), ..planned };
     let broken = looked.broken.iter().cloned().chain(missing).collect();
     let watch = monitor::watch(&looked.watched, &network.graphs, seen, broken);
-    let tolerance = tolerance(mission, &network.graphs, &watch, &looked.watched);
+    let mut speed = flown.speed.clone();
+    speed.command(SpeedCommand { at: flown.end, speed: status.speed });
+    let tolerance = tolerance(mission, &speed, &network.graphs, &watch, &looked.watched);
     let t = flown.end.secs();
     // Between words, a vehicle is taken to go on at v_L: it strays by what coordination asks of it meanwhile.
     let mut errors = vec![(0.0, initial_error)];
     errors.extend(error.map(|error| (t, error)));
-    let allowed = watch.envelope.as_ref().map(|envelope| tolerance.allowed(envelope, initial_error, t));
+    // What the error was when v_L changed is not known here: the report judges what comes after.
+    let changed = status.speed_since > Time::ZERO;
+    let allowed =
+        watch.envelope.as_ref().filter(|_| !changed).map(|envelope| tolerance.allowed(envelope, initial_error, t));
     let verdict = match (error, watch.judge(&errors, tolerance)) {
         (None, monitor::Judgement::Covered { statement, .. }) => {
             format!("covered by {statement}; not every vehicle has said where it is")
         }
-        (_, judged) => judged.to_string(),
+        (_, judged) => match watch.envelope.filter(|_| changed && watch.covered_by.is_some()) {
+            Some(Envelope { statement, .. }) => format!(
+                "covered by {statement}; v_L changed at {:.2} s, and the report will judge the errors before and since",
+                status.speed_since.secs()
+            ),
+            None => judged.to_string(),
+        },
     };
     Some(said(&watch, flown.end, initial_error, errors_now, allowed, verdict))
 }
@@ -221,6 +232,7 @@ mod tests {
             now,
             end: mission.end,
             speed: 0.5,
+            speed_since: Time::ZERO,
             vehicles: vehicles.collect(),
             collected: false,
             messages: [0; 4],
@@ -269,6 +281,20 @@ mod tests {
         let words = "882 of 981 messages were dropped for other reasons: queue full";
         assert!(dropped.covered_by.is_none() && dropped.verdict.contains(words), "{dropped}");
         assert!(dropped.broken.iter().any(|premise| premise.found == words), "{dropped:?}");
+    }
+
+    #[test]
+    fn after_a_change_of_v_l_the_errors_are_left_to_the_report() {
+        let (mission, far) = at(60.0, [10.0, 30.0, 90.0], [true; 3]);
+        let changed = FleetStatus { speed: 0.9, speed_since: Time::from_secs(59.5), ..far };
+        let said = so_far(&mission, &changed).expect("time has passed");
+        assert!(said.verdict.starts_with("covered by Theorem 4.4; v_L changed at 59.50 s"), "{}", said.verdict);
+        assert_eq!((said.allowed, said.to_string().contains("allowed\n")), (None, false), "{said}");
+        // What does not cover the fleet is said as ever.
+        let mut changed = changed;
+        changed.vehicles[2].connected = false;
+        let said = so_far(&mission, &changed).expect("time has passed");
+        assert!(said.verdict.contains("auv3 is not connected"), "{}", said.verdict);
     }
 
     #[test]

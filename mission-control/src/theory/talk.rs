@@ -8,7 +8,7 @@ use common::mission::{Link, Mission, VehiclePlan};
 use common::network::Delay;
 use common::theory::known_delay_by_link::{self, Late};
 use common::theory::{delay, event_triggered, known_delay};
-use common::time::Span;
+use common::time::{Span, Time};
 
 use super::late_news::is_4_34;
 use super::premises::lost;
@@ -196,12 +196,13 @@ pub(super) fn row_of_events(case: &Case<'_>) -> Option<TheoryRow> {
                 "a gain too large for news that are σ = {oldest:.3} s old: σk(λ_max g + d) = {share:.3}, not below 1"
             )
         }),
+        of_beliefs.zip(bound).and_then(|(news, bound)| changed_too_late(case, news, bound)),
     ];
     let lacks: String = premises.chain(of_bound.into_iter().flatten()).map(|lack| format!("; {lack}")).collect();
     Some(TheoryRow {
         name: "Coordination error left by event-triggered talk".into(),
-        condition: "fixed two-way connected network, bounded delays, nothing lost, advance, equal gains with σk(λ_max g + d) < 1, type II or a \
-                    kinematic vehicle along its line"
+        condition: "fixed two-way connected network, bounded delays, nothing lost, advance, equal gains with σk(λ_max g + d) < 1, \
+                    v_L constant for long enough before the end, type II or a kinematic vehicle along its line"
             .into(),
         value: format!("threshold {} in the end{lacks}", trigger.floor()),
         holds: Some(lacks.is_empty()),
@@ -219,6 +220,30 @@ fn lost_in_words(mission: &Mission) -> String {
         ways if ways.is_empty() => String::new(),
         ways => format!("messages are lost: {}", ways.join(", ")),
     }
+}
+
+/// What changes of v_L have left at the end counts as forgotten below this part of the bound.
+const FORGOTTEN: f64 = 0.01;
+
+/// That v_L changed too shortly before the end, and by how much; news are up to `oldest` old \[s\] when they are used.
+fn changed_too_late(case: &Case<'_>, (oldest, gain): (f64, f64), bound: f64) -> Option<String> {
+    let (graph, silence) = (&case.network.graph, case.mission.talk?.most_silence());
+    let end = case.summary.map_or(case.mission.end, |summary| Time::from_secs(summary.duration_s));
+    let changes = case.speed().changes(end);
+    let (last, _) = changes.last()?;
+    let left = changes.iter().map(|(at, by)| {
+        // Nothing is believed that was said before the start, or longer ago than anyone is silent.
+        let age = silence.map_or(at.secs(), |silence| silence.secs().min(at.secs())) + oldest;
+        let added = event_triggered::added_by_a_change(graph, gain, by.abs() * age, oldest)?;
+        Some(added * event_triggered::left_after(graph, gain, ((end - *at).secs() - oldest).max(0.0))?)
+    });
+    let part = FORGOTTEN * bound / left.sum::<Option<f64>>()?;
+    (part < 1.0).then_some(())?;
+    let missing = event_triggered::time_until(graph, gain, part)?;
+    Some(format!(
+        "v_L changes {:.3} s before the end, at {last}, which is {missing:.3} s too late for what that leaves to be forgotten",
+        (end - *last).secs()
+    ))
 }
 
 /// How many links go one way only, if any does.
@@ -271,5 +296,31 @@ pub fn speed_factor(mission: &Mission) -> Option<f64> {
     match &mission.law_choice {
         LawChoice::DelayedEstimating(law) => common_delay(mission).map(|tau| delay::steady_speed(1.0, law.gain, tau)),
         _ => Some(mission.nominal_factor()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOUNDED: &str = include_str!("../../../missions/talk/bounded.toml");
+
+    /// The row of a flight whose speed goes up to `speed` at this time.
+    fn row(at_s: f64, speed: f64) -> TheoryRow {
+        let step = format!("\nprofile = [{{ from_s = 0.0, speed = 0.5 }}, {{ from_s = {at_s}, speed = {speed} }}]\n");
+        let text = BOUNDED.replacen("\nspeed = 0.5\n", &step, 1);
+        let mission = Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}"));
+        row_of_events(&Case::new(&mission, None)).expect("it speaks by event")
+    }
+
+    #[test]
+    fn a_change_of_v_l_shortly_before_the_end_is_not_covered_by_the_bound_of_talk_by_event() {
+        let late = row(119.0, 5.0);
+        assert_eq!((late.holds, late.predicted.as_str()), (Some(false), "–"), "{late:?}");
+        assert!(late.value.contains("v_L changes 1.000 s before the end, at 119.000 s, which is 9"), "{}", late.value);
+        let early = row(20.0, 0.6);
+        assert!(early.holds == Some(true) && early.predicted.contains("0.2015"), "{early:?}");
+        // The same speed again is no change.
+        assert_eq!(row(119.0, 0.5).holds, Some(true));
     }
 }

@@ -7,8 +7,10 @@ use common::graph::Graph;
 use common::mission::Mission;
 use common::mission::file::LawChoice;
 use common::record::Fate;
-use common::theory::monitor::{self, Envelope, Exchange, Judgement, Margin, Premise, Seen, Tolerance, Watch, Watched};
-use common::time::Span;
+use common::theory::monitor::{
+    self, Envelope, Exchange, Judgement, Margin, Premise, Seen, Stretch, Tolerance, Watch, Watched,
+};
+use common::time::{Span, Time};
 
 use super::network::Network;
 use super::premises::{Looked, age, dropped, looked_for, tolerance};
@@ -28,8 +30,8 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
     };
     let broken = looked.broken.iter().cloned().chain(missing(case)).collect();
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
-    let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
-    let judged = watch.judge(&errors(summary, f64::INFINITY), tolerance);
+    let tolerance = tolerance(case.mission, &case.speed(), &case.network.graphs, &watch, &looked.watched);
+    let (judged, stretches) = judge(case, summary, &watch, &looked.watched, tolerance, f64::INFINITY);
     let grown = match judged {
         Judgement::Covered { statement, closest: None } => grown(case, statement),
         _ => None,
@@ -41,7 +43,7 @@ pub(super) fn row(case: &Case<'_>) -> Option<TheoryRow> {
         guaranteed_rate: watch.envelope.as_ref().map(|envelope| envelope.rate),
         measured: match grown {
             Some(grown) => grown,
-            None => format!("{judged}{}", before_absence(case, &looked).unwrap_or_default()),
+            None => format!("{judged}{stretches}{}", before_absence(case, &looked).unwrap_or_default()),
         },
         ..empty()
     })
@@ -78,6 +80,11 @@ pub fn envelope_over(
     if looked.watched == Watched::Delayed {
         return Err("Lemmas 4.4 and 4.5, which speak of this law, promise agreement without a rate".to_string());
     }
+    if let Some((at, _)) = mission.speed.changes(mission.end).first() {
+        return Err(format!(
+            "v_L changes under way, first at {at}, and for as long as news from before a change are used, the bound does not hold"
+        ));
+    }
     // No link is up for a shorter time than the dwell time.
     let period = mission.control_period * mission.message_ticks;
     let exchange = Exchange {
@@ -89,7 +96,7 @@ pub fn envelope_over(
     // connected: Definition 4.4 with T = T_0.
     let seen = Seen { length, alpha, t_0: Some(t_0), dwell, mean: Some(t_0), exchange: Some(exchange) };
     let watch = monitor::watch(&looked.watched, graphs, seen, looked.broken);
-    let tolerance = tolerance(mission, graphs, &watch, &looked.watched);
+    let tolerance = tolerance(mission, &mission.speed, graphs, &watch, &looked.watched);
     let envelope = watch.envelope.ok_or_else(|| watch.judge(&[], Tolerance::default()).to_string())?;
     Ok((envelope, tolerance))
 }
@@ -115,6 +122,45 @@ fn seen(mission: &Mission, measured: &Connectivity, looked: &Looked) -> Option<S
             unheard: measured.unheard,
         }),
     })
+}
+
+/// Judges a flight until then \[s\], stretch by stretch where v_L changed, and says so.
+fn judge(
+    case: &Case<'_>,
+    summary: &Summary,
+    watch: &Watch,
+    watched: &Watched,
+    tolerance: Tolerance,
+    until_s: f64,
+) -> (Judgement, String) {
+    let errors = errors(summary, until_s);
+    let end_s = errors.last().map_or(0.0, |(t, _)| *t);
+    let changes = case.speed().changes(Time::from_secs(end_s));
+    let changes: Vec<f64> = changes.iter().map(|(at, _)| at.secs()).collect();
+    let (judged, left) = watch.judge_between(watched, &errors, &changes, tolerance);
+    let words = match (&judged, watch.envelope, changes.last()) {
+        (Judgement::NotCovered { .. }, ..) | (_, None, _) | (.., None) => String::new(),
+        (.., Some(last)) => stretches_in_words(changes.len(), *last, &left, watched, tolerance),
+    };
+    (judged, words)
+}
+
+/// From when on the errors are judged anew, and which are not judged.
+fn stretches_in_words(changes: usize, last: f64, left: &[Stretch], watched: &Watched, tolerance: Tolerance) -> String {
+    let times = if changes == 1 { "once".to_string() } else { format!("{changes} times") };
+    let changed = format!("v_L changed {times}, last at {last:.2} s");
+    if !watched.begins_anew() {
+        return format!(
+            "; {changed}: judged until the first change alone, for what states the law had then is not known"
+        );
+    }
+    let anew = format!("; {changed}: judged anew from {:.3} s after each change on", tolerance.late);
+    let from: Vec<String> =
+        left.iter().filter_map(|stretch| stretch.since).map(|since| format!("{since:.2} s")).collect();
+    match from.is_empty() {
+        true => anew,
+        false => format!("{anew}, and too briefly constant to be judged from {} on", from.join(", ")),
+    }
 }
 
 fn errors(summary: &Summary, until_s: f64) -> Vec<(f64, f64)> {
@@ -170,7 +216,7 @@ fn unrecorded(fleet: &FleetSummary) -> Vec<&str> {
 fn grown(case: &Case<'_>, statement: &str) -> Option<String> {
     let norm = &case.summary?.fleet.coordination.series.norm;
     let (first, last) = (*norm.first()?, *norm.last()?);
-    let way = case.mission.speed.fastest() * case.mission.end.secs();
+    let way = case.speed().fastest() * case.mission.end.secs();
     (!last.is_finite() || last > FAR * first + way).then(|| {
         format!("a defect: covered by {statement}, and yet the error at the end is {last:.3e}, from {first:.3e} at the start")
     })
@@ -189,9 +235,9 @@ fn before_absence(case: &Case<'_>, looked: &Looked) -> Option<String> {
     let before = |fate| if fate == Fate::ReceiverAbsent { 0 } else { counts.met(fate) };
     let broken = looked.broken.iter().cloned().chain(dropped(case.mission, counts.sent, before)).collect();
     let watch = monitor::watch(&looked.watched, &case.network.graphs, seen, broken);
-    let tolerance = tolerance(case.mission, &case.network.graphs, &watch, &looked.watched);
-    let judged = watch.judge(&errors(summary, first.from_s), tolerance);
-    Some(format!("; judged until {:.1} s alone: {judged}", first.from_s))
+    let tolerance = tolerance(case.mission, &case.speed(), &case.network.graphs, &watch, &looked.watched);
+    let (judged, stretches) = judge(case, summary, &watch, &looked.watched, tolerance, first.from_s);
+    Some(format!("; judged until {:.1} s alone: {judged}{stretches}", first.from_s))
 }
 
 /// A law that no statement about switching networks speaks of.
@@ -341,6 +387,53 @@ mod tests {
         let (row, guarantee) = judged(&mission, &flown(&mission));
         assert!(row.measured.starts_with("covered by Theorem 4.5; the error reached"), "{row:?}");
         assert!(guarantee.is_some_and(|g| g.rate > 0.004 && g.factor.is_some_and(|factor| factor > 1.0)));
+    }
+
+    /// Long enough for little to be left of the start when v_L steps.
+    const A_STEP: [(&str, &str); 2] = [
+        ("\nspeed = 0.5\n", "\nprofile = [{ from_s = 0.0, speed = 0.5 }, { from_s = 200.03, speed = 0.9 }]\n"),
+        ("duration_s = 120.0", "duration_s = 300.0"),
+    ];
+
+    #[test]
+    fn a_step_of_v_l_after_a_long_decay_is_no_defect() {
+        let always = ("switching = { periodic = { period_s = 10.0, up_from_s = 7.5, up_for_s = 2.5 } }", "");
+        for changes in [vec![A_STEP[0], A_STEP[1]], vec![A_STEP[0], A_STEP[1], always]] {
+            let verdict = verdict(BRIEF_LOSSES, &changes);
+            assert!(verdict.starts_with("covered by Theorem 4.4; the error reached"), "{verdict}");
+            assert!(verdict.contains("v_L changed once, last at 200.03 s: judged anew from 0."), "{verdict}");
+        }
+    }
+
+    #[test]
+    fn a_violation_before_a_step_or_after_it_is_a_defect_still() {
+        let mission = changed(BRIEF_LOSSES, &A_STEP);
+        let recording = flown(&mission);
+        // One vehicle is far ahead for a while, which the others do nothing about.
+        for (from_s, to_s) in [(150.0, 160.0), (250.0, 260.0)] {
+            let mut pushed = recording.clone();
+            for record in &mut pushed.exact {
+                if let Record::State(row) = record
+                    && &*row.vehicle == "auv1"
+                    && (from_s..to_s).contains(&(row.t_ns as f64 / 1e9))
+                {
+                    row.xi += 50.0;
+                }
+            }
+            let (row, _) = judged(&mission, &pushed);
+            let at = format!("and yet the error at {from_s:.2} s");
+            assert!(row.holds == Some(false) && row.measured.contains(&at), "{}", row.measured);
+        }
+    }
+
+    #[test]
+    fn a_step_that_is_commanded_is_one_too() {
+        let mission = changed(BRIEF_LOSSES, &A_STEP);
+        let recording = flown(&mission);
+        // The same flight, whose mission did not plan the step.
+        let unplanned = changed(BRIEF_LOSSES, &A_STEP[1..]);
+        let (row, _) = judged(&unplanned, &recording);
+        assert!(row.holds == Some(true) && row.measured.contains("last at 200.03 s"), "{}", row.measured);
     }
 
     #[test]

@@ -428,6 +428,17 @@ mod tests {
     }
 
     #[test]
+    fn a_flight_in_which_v_l_changes_is_not_bounded() {
+        let step = "\nprofile = [{ from_s = 0.0, speed = 0.5 }, { from_s = 39.0, speed = 0.9 }]\n";
+        let stepped = mission(&brief().text.replace("\nspeed = 0.5\n", step));
+        let unbounded = found(&stepped, (0.75, 7.5, 2.5), 2);
+        assert_eq!((unbounded.bound, unbounded.within), (None, None));
+        assert!(unbounded.no_bound.is_some_and(|reason| reason.contains("v_L changes under way, first at 39.000 s")));
+        let late = mission(&stepped.text.replace("from_s = 39.0", "from_s = 40.0"));
+        assert_eq!(found(&late, (0.75, 7.5, 2.5), 2).within, Some(true), "at the end it changes nothing any more");
+    }
+
+    #[test]
     fn the_law_with_a_state_of_its_own_and_means_are_bounded_too() {
         const EXAMPLE: &str = include_str!("../../../missions/thesis/eq-4-62-example-4-1.toml");
         let folder = tempfile::tempdir().expect("a folder");

@@ -70,10 +70,10 @@ impl Hub {
             Some(load) => load.now,
             None => Time::ZERO,
         };
-        let speed = load.map_or(0.0, |load| {
+        let (speed, speed_since) = load.map_or((0.0, Time::ZERO), |load| {
             let mut profile = load.mission.speed.clone();
             load.speeds.iter().for_each(|command| profile.command(*command));
-            profile.at(now).v_l
+            (profile.at(now).v_l, profile.last_change(now))
         });
         let status = FleetStatus {
             phase: self.phase(),
@@ -81,6 +81,7 @@ impl Hub {
             now,
             end: load.map_or(Time::ZERO, |load| load.mission.end),
             speed,
+            speed_since,
             vehicles,
             collected: load.is_some_and(|load| load.collected),
             pace: load.and_then(|load| load.clock).map(|clock| match clock {

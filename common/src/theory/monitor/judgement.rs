@@ -33,6 +33,23 @@ pub enum Judgement {
     },
 }
 
+impl Judgement {
+    /// Of a stretch and of one after it: a defect in either is one.
+    pub fn with(self, later: Judgement) -> Judgement {
+        match (self, later) {
+            (
+                Judgement::Covered { statement, closest: Some(before) },
+                Judgement::Covered { closest: Some(after), .. },
+            ) => Judgement::Covered { statement, closest: Some(before.max(after)) },
+            (earlier @ Judgement::Covered { closest: Some(_), .. }, Judgement::Covered { closest: None, .. }) => {
+                earlier
+            }
+            (Judgement::Covered { .. }, later) => later,
+            (earlier, _) => earlier,
+        }
+    }
+}
+
 impl std::fmt::Display for Judgement {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

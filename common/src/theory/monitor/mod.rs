@@ -18,12 +18,14 @@
 //! to be behind by v_L h each; the part of that which differs between vehicles leaves an error of up to v_L h √n D/λ, with
 //! D the most neighbours of anybody and λ the connectivity ([`Tolerance::added`]).
 //!
-//! [`watch`] asks which statement covers the fleet, and [`Watch::judge`] holds the errors against it.
+//! [`watch`] asks which statement covers the fleet, and [`Watch::judge`] holds the errors against it; those of a flight in which
+//! v_L changed [stretch by stretch](Watch::judge_between).
 
 mod condition;
 mod envelope;
 mod judgement;
 mod seen;
+mod stretches;
 #[cfg(test)]
 mod tests;
 
@@ -31,6 +33,7 @@ pub use condition::{Margin, Premise};
 pub use envelope::{Envelope, Tolerance};
 pub use judgement::Judgement;
 pub use seen::{Exchange, Seen};
+pub use stretches::{Stretch, stretches};
 
 use super::lemma_4_6::Dynamic;
 use super::theorem_4_4::Coordination;
@@ -60,6 +63,12 @@ pub enum Watched {
 }
 
 impl Watched {
+    /// Whether the envelope may begin at any instant with the error that is there then. That of Lemma 4.7 bounds ‖(θ, z)‖ by what it was at the
+    /// start, where z = 0; what z is later is not seen.
+    pub fn begins_anew(&self) -> bool {
+        !matches!(self, Watched::Dynamic(..))
+    }
+
     /// σ: no eigenvalue of KL_p, and of what else passes news on, is larger \[1/s\].
     fn speed(&self, graphs: &[Graph]) -> f64 {
         let degree = most_neighbours(graphs);
@@ -245,7 +254,28 @@ impl Watch {
         Tolerance { late: age.secs(), slower, added: drift.abs() * age.secs() * left }
     }
 
-    /// Judges the errors measured over time, as (t \[s\], ‖e‖), the first one the error at the start.
+    /// Judges the errors of a flight in which v_L changed, stretch by stretch, each from its own beginning; with those that cannot be judged.
+    ///
+    /// The first defect counts, wherever it is; without one, what came closest to its envelope.
+    pub fn judge_between(
+        &self,
+        watched: &Watched,
+        errors: &[(f64, f64)],
+        changes: &[f64],
+        tolerance: Tolerance,
+    ) -> (Judgement, Vec<Stretch>) {
+        if self.envelope.is_none() {
+            return (self.judge(errors, tolerance), Vec::new());
+        }
+        let (judged, left): (Vec<Stretch>, Vec<Stretch>) = stretches(errors, changes, tolerance.late)
+            .into_iter()
+            .partition(|stretch| stretch.since.is_none() || (watched.begins_anew() && stretch.can_be_judged()));
+        let judgements = judged.iter().map(|stretch| self.judge(&stretch.errors, tolerance));
+        let whole = judgements.reduce(Judgement::with).unwrap_or_else(|| self.judge(errors, tolerance));
+        (whole, left)
+    }
+
+    /// Judges the errors measured over time while v_L is constant, as (t \[s\], ‖e‖), the first one the error at the start.
     pub fn judge(&self, errors: &[(f64, f64)], tolerance: Tolerance) -> Judgement {
         let Some(statement) = self.covered_by else {
             return Judgement::NotCovered { failing: self.failing(), broken: self.broken.clone() };

@@ -202,6 +202,67 @@ fn the_margins_of_type_i_are_those_of_the_theorem() {
     assert_eq!((type_ii.margins[0].value, type_ii.margins[0].limit), (0.75, 1.0));
 }
 
+/// What an envelope allows, with something to spare, from this error at this time on.
+fn decaying(envelope: &Envelope, from: f64, to: f64, first: f64) -> Vec<(f64, f64)> {
+    let at = |i: u32| from + (to - from) * f64::from(i) / 50.0;
+    (0..=50).map(|i| (at(i), 0.9 * first * (-envelope.rate * (at(i) - from)).exp())).collect()
+}
+
+#[test]
+fn each_stretch_between_changes_of_v_l_is_judged_by_its_own_beginning() {
+    let (graphs, seen) = row_of_three(2.5, 600.0);
+    let watched = agreement(0.1);
+    let watch = watch(&watched, &graphs, seen, Vec::new());
+    let envelope = watch.envelope.expect("a rate");
+    let tolerance = Tolerance { late: 0.4, slower: 0.0, added: 1e-9 };
+    // A long decay, a step that leaves far more than is left of the start, and a decay from there.
+    let before = decaying(&envelope, 0.0, 300.0, 1.0);
+    let after = decaying(&envelope, 300.5, 600.0, 0.5);
+    let flight = |parts: [&[(f64, f64)]; 2]| parts.concat();
+    let judged = |errors: &[(f64, f64)], changes: &[f64]| watch.judge_between(&watched, errors, changes, tolerance);
+    let sound = flight([&before, &after]);
+    assert!(matches!(judged(&sound, &[]).0, Judgement::Defect { at: 300.5, .. }), "v_L was constant");
+    let (covered, left) = judged(&sound, &[300.0]);
+    assert!(matches!(covered, Judgement::Covered { closest: Some(part), .. } if part < 1.0), "{covered}");
+    assert!(left.is_empty());
+    // Idle after the step, or before it, however well the other stretch goes.
+    let idle = |errors: &[(f64, f64)]| errors.iter().map(|(t, _)| (*t, errors[0].1)).collect::<Vec<_>>();
+    let (idle_after, idle_before) = (flight([&before, &idle(&after)]), flight([&idle(&before), &after]));
+    assert!(matches!(judged(&idle_after, &[300.0]).0, Judgement::Defect { at, .. } if at > 300.5), "after");
+    assert!(matches!(judged(&idle_before, &[300.0]).0, Judgement::Defect { at, .. } if at < 300.0), "before");
+    // A change shortly before the end leaves a stretch that cannot be judged, and hides nothing that was before it.
+    let (covered, left) = judged(&before, &[299.9]);
+    assert!(matches!(covered, Judgement::Covered { .. }) && left[0].since == Some(299.9), "{covered}");
+    assert!(matches!(judged(&idle(&before), &[299.9]).0, Judgement::Defect { .. }));
+    // What the law with a state of its own begins with later is not known.
+    let dynamic = Watched::Dynamic(1.0, 1.6);
+    let watch = super::watch(&dynamic, &graphs, seen, Vec::new());
+    let (_, left) = watch.judge_between(&dynamic, &sound, &[300.0], tolerance);
+    assert_eq!(left.len(), 1);
+    // Where there is no envelope, there are no stretches; where nothing covers, nothing is judged.
+    let delayed = super::watch(&Watched::Delayed, &graphs, seen, Vec::new());
+    let judged = delayed.judge_between(&Watched::Delayed, &sound, &[300.0], tolerance);
+    assert!(matches!(judged, (Judgement::Covered { closest: None, .. }, left) if left.is_empty()));
+}
+
+#[test]
+fn judgements_of_stretches_are_put_together() {
+    let covered = |closest| Judgement::Covered { statement: "a statement", closest };
+    let envelope = Envelope { statement: "a statement", factor: 1.0, rate: 1.0 };
+    let defect = |at| Judgement::Defect { envelope, at, found: 2.0, allowed: 1.0 };
+    for (one, other, both) in [
+        (covered(Some(0.5)), covered(Some(0.2)), covered(Some(0.5))),
+        (covered(Some(0.2)), covered(Some(0.5)), covered(Some(0.5))),
+        (covered(Some(0.2)), covered(None), covered(Some(0.2))),
+        (covered(None), covered(Some(0.2)), covered(Some(0.2))),
+        (covered(Some(0.2)), defect(5.0), defect(5.0)),
+        (defect(5.0), covered(Some(0.2)), defect(5.0)),
+        (defect(5.0), defect(9.0), defect(5.0)),
+    ] {
+        assert_eq!(one.with(other), both);
+    }
+}
+
 #[test]
 fn envelope_and_allowance_by_hand() {
     let envelope = Envelope { statement: "a statement", factor: 3.0, rate: 0.4 };
