@@ -38,7 +38,7 @@ pub enum ConductInput {
     /// The line to the fleet is down.
     Lost,
     /// The fleet said something.
-    FromFleet(FromFleet),
+    FromFleet(Box<FromFleet>),
     /// The person at the terminal wants it ended.
     Interrupt,
 }
@@ -408,15 +408,17 @@ impl Machine for Conduct {
         match input {
             Some(ConductInput::Connected) => self.poll(now),
             Some(ConductInput::Lost) => self.outputs.push_back(ConductOutput::Progress(self.step, None)),
-            Some(ConductInput::FromFleet(FromFleet::Status(status))) => self.status(now, status),
-            Some(ConductInput::FromFleet(FromFleet::Log { who, piece })) => self.log(now, &who, piece),
-            Some(ConductInput::FromFleet(FromFleet::Refused { reason })) => match self.step {
-                // A vehicle may have left between the status and the start.
-                Step::Starting => self.enter(Step::Arming, now),
-                Step::Arming => self.fail(reason),
-                _ => {}
+            Some(ConductInput::FromFleet(message)) => match *message {
+                FromFleet::Status(status) => self.status(now, status),
+                FromFleet::Log { who, piece } => self.log(now, &who, piece),
+                FromFleet::Refused { reason } => match self.step {
+                    // A vehicle may have left between the status and the start.
+                    Step::Starting => self.enter(Step::Arming, now),
+                    Step::Arming => self.fail(reason),
+                    _ => {}
+                },
+                FromFleet::SpeedTaken { .. } => {}
             },
-            Some(ConductInput::FromFleet(FromFleet::SpeedTaken { .. })) => {}
             Some(ConductInput::Interrupt) => match self.step {
                 Step::Starting | Step::Flying => self.send(ToFleet::Stop),
                 Step::Collecting | Step::Ended => {}
@@ -472,7 +474,7 @@ mod tests {
 
     /// What it says to the fleet, and how it ends, when the fleet says this.
     fn hears(conduct: &mut Conduct, at_s: f64, message: FromFleet) -> Vec<ConductOutput> {
-        conduct.handle(Time::from_secs(at_s), Some(ConductInput::FromFleet(message)));
+        conduct.handle(Time::from_secs(at_s), Some(ConductInput::FromFleet(message.into())));
         let all = std::iter::from_fn(|| conduct.poll_output());
         all.filter(|output| !matches!(output, ConductOutput::Progress(..))).collect()
     }

@@ -446,7 +446,7 @@ impl Port for ConductPort<'_> {
                 None
             }
             LineEvent::Packet { plane: Plane::Mission, bytes, .. } => match wire::decode::<FromFleet>(&bytes) {
-                Ok(message) => Some((None, ConductInput::FromFleet(message))),
+                Ok(message) => Some((None, ConductInput::FromFleet(message.into()))),
                 Err(kind) => {
                     if self.garbage.count(kind) {
                         self.progress.line(&format!("ignored a message of the fleet: {}", kind.as_str()));

@@ -150,7 +150,7 @@ impl Fleet<'_> {
                     }
                 }
                 HubOutput::ToControl { message, .. } => {
-                    self.events.push_back(Event::Conduct(ConductInput::FromFleet(message)));
+                    self.events.push_back(Event::Conduct(ConductInput::FromFleet(message.into())));
                 }
                 HubOutput::Record(row) => record(row),
                 HubOutput::Settled(settled) => {
