@@ -118,6 +118,43 @@ fn what_is_decided_about_a_message_does_not_depend_on_the_others() {
     assert_eq!(fates(&alternating), fates(&one_by_one));
 }
 
+/// Each model takes numbers of its own: what one decides stays as it is when another has other parameters.
+#[test]
+fn a_model_with_other_parameters_leaves_what_the_others_decide() {
+    let network = |[delay, loss, duplicate, corrupt]: [&str; 4]| {
+        mission(&format!(
+            "delay = {{ {delay} }}\nloss = {{ {loss} }}\nduplicate_probability = {duplicate}\ncorrupt_probability = {corrupt}"
+        ))
+    };
+    // The numbers of the messages that met these fates, and of those that were decided about by the model at all.
+    let met = |models: [&str; 4], fate: Fate, among: &BTreeSet<u64>| -> BTreeSet<u64> {
+        let words: Vec<(f64, u16, u32)> = (0..400).map(|seq| (f64::from(seq), 0, seq)).collect();
+        let (_, outputs) = run(&network(models), &words, 500.0);
+        let met = fates(&outputs, "v1", "v2").into_iter().filter(|(_, found)| *found == fate);
+        met.map(|(seq, _)| seq).filter(|seq| among.contains(seq)).collect()
+    };
+    let (constant, jittered) = ("constant = { delay_s = 0.1 }", "jittered = { min_s = 0.1, max_s = 9.0 }");
+    let (single, none) = ("bernoulli = { probability = 0.3 }", "bernoulli = { probability = 0.0 }");
+    let base = [constant, single, "0.3", "0.2"];
+    let all: BTreeSet<u64> = (0..400).collect();
+    let lost = met(base, Fate::Lost, &all);
+    let arrived: BTreeSet<u64> = all.difference(&lost).copied().collect();
+    let corrupt = met(base, Fate::Corrupt, &all);
+    let sound: BTreeSet<u64> = arrived.difference(&corrupt).copied().collect();
+    let copied = met(base, Fate::Copied, &all);
+    assert!([&lost, &corrupt, &copied].iter().all(|numbers| numbers.len() > 30), "each model has something to decide");
+    for other in [[jittered, single, "0.3", "0.2"], [constant, single, "0.9", "0.2"], [constant, single, "0.3", "0.7"]]
+    {
+        assert_eq!(met(other, Fate::Lost, &all), lost, "{other:?}");
+    }
+    for other in [[jittered, single, "0.3", "0.2"], [constant, none, "0.3", "0.2"], [constant, single, "0.9", "0.2"]] {
+        assert_eq!(met(other, Fate::Corrupt, &arrived), corrupt, "{other:?}");
+    }
+    for other in [[jittered, single, "0.3", "0.2"], [constant, none, "0.3", "0.2"], [constant, single, "0.3", "0.0"]] {
+        assert_eq!(met(other, Fate::Copied, &sound), copied, "{other:?}");
+    }
+}
+
 #[test]
 fn garbage_is_counted_and_changes_no_ledger() {
     let mission = mission("");
