@@ -45,6 +45,8 @@ mod steady_motion;
 mod surroundings;
 mod switching;
 mod talk;
+#[cfg(test)]
+mod testing;
 mod together;
 mod watched;
 mod weights_and_patterns;

@@ -261,39 +261,18 @@ pub(super) fn following(mission: &Mission) -> Result<PathFollowing, Premise> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use bus::recording::Recording;
-    use common::record::{Record, Row};
+    use common::record::Record;
 
     use super::*;
     use crate::facts::facts;
     use crate::results::{Summary, TheoryRow, summarise};
-    use crate::simulate::simulate;
+    use crate::theory::testing::{changed as mission, flown};
     use crate::theory::{lost_its_rate, rows};
 
     const KNOWN_DELAY: &str = include_str!("../../../missions/talk/known-delay.toml");
     const BOUNDED: &str = include_str!("../../../missions/talk/bounded.toml");
     const HELIX: &str = include_str!("../../../missions/auv-helix.toml");
-
-    fn mission(text: &str, changes: &[(&str, &str)]) -> Arc<Mission> {
-        let text = changes.iter().fold(text.to_string(), |text, (from, to)| {
-            assert!(text.contains(from), "{from}");
-            text.replace(from, to)
-        });
-        Arc::new(Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
-    }
-
-    fn flown(mission: &Arc<Mission>) -> Recording {
-        let mut recording = Recording { complete: true, ..Recording::default() };
-        let keep = |row: Row| {
-            if let Row::Exact(record) = row {
-                recording.exact.push(record);
-            }
-        };
-        simulate(mission, keep, |_| true).expect("flies");
-        recording
-    }
 
     fn summary(mission: &Mission, recording: &Recording) -> Summary {
         summarise(recording, &facts(mission))

@@ -331,38 +331,18 @@ fn margins(watch: &Watch) -> String {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
-    use std::sync::Arc;
 
     use bus::recording::Recording;
-    use common::record::{Record, Row};
+    use common::record::Record;
 
     use super::*;
     use crate::facts::facts;
     use crate::results::summarise;
-    use crate::simulate::simulate;
+    use crate::theory::testing::{changed, flown};
 
     const BRIEF_LOSSES: &str = include_str!("../../../missions/brief-losses.toml");
     const HELIX: &str = include_str!("../../../missions/auv-helix.toml");
     const ONE_LINK: &str = include_str!("../../../missions/thesis/ucm-one-link-at-a-time.toml");
-
-    fn changed(text: &str, changes: &[(&str, &str)]) -> Arc<Mission> {
-        let text = changes.iter().fold(text.to_string(), |text, (from, to)| {
-            assert!(text.contains(from), "{from}");
-            text.replace(from, to)
-        });
-        Arc::new(Mission::parse("m.toml", &text).unwrap_or_else(|faults| panic!("{faults}")))
-    }
-
-    fn flown(mission: &Arc<Mission>) -> Recording {
-        let mut recording = Recording { complete: true, ..Recording::default() };
-        let keep = |row: Row| {
-            if let Row::Exact(record) = row {
-                recording.exact.push(record);
-            }
-        };
-        simulate(mission, keep, |_| true).expect("flies");
-        recording
-    }
 
     fn judged(mission: &Mission, recording: &Recording) -> (TheoryRow, Option<Guarantee>) {
         let summary = summarise(recording, &facts(mission));
